@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// Edits: the ordered, non-destructive operations a world is made of, and the object trees they may place.
+// Plain data; nothing here evaluates. Typed shapes and warps (`Sphere{.radius = 1}`) are in <kiln/shapes.h>,
+// generated from the same files that define their distance functions.
+#pragma once
+
+#include <kiln/math.h>
+
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace kiln {
+
+/// Typed index with a generation: a stale id is detected, never dereferenced. Default: refers to nothing.
+template <typename Tag>
+struct Id {
+    uint32_t index = UINT32_MAX;
+    uint32_t generation = 0;
+    constexpr explicit operator bool() const { return index != UINT32_MAX; }
+    friend auto operator<=>(const Id&, const Id&) = default;
+};
+using EditId = Id<struct EditTag>;
+using ObjectId = Id<struct ObjectTag>;
+using MaterialId = Id<struct MaterialTag>;
+
+/// glTF 2.0 metallic-roughness, scene-linear Rec. 709.
+struct Material {
+    vec3 base_color{0.5f, 0.5f, 0.5f};
+    float roughness = 0.7f;      ///< perceptual, [0, 1]; alpha = roughness²
+    float metallic = 0.0f;       ///< [0, 1]
+    vec3 emissive{0, 0, 0};      ///< radiance, cd/m²
+    float opacity = 1.0f;        ///< (0, 1]; below 1 the forward pass draws it
+    float friction = 0.5f;       ///< >= 0
+    float restitution = 0.0f;    ///< [0, 1]
+    friend bool operator==(const Material&, const Material&) = default;
+};
+
+/// How an edit acts on all before it. Smooth where blend_radius > 0.
+enum class Op : uint8_t { Union, Subtract, Intersect, Paint };
+
+inline constexpr int kMaxParams = 12;  ///< most numbers any shape or warp has
+
+/// One primitive. `kind` indexes the generated shape table; `params` are its fields in order of declaration.
+/// `data` is only for shapes with a resource: the file of `heightfield` and `mesh`, the text of `expression`.
+struct Shape {
+    uint16_t kind = 0;
+    std::array<float, kMaxParams> params{};
+    std::string data;
+    friend bool operator==(const Shape&, const Shape&) = default;
+};
+
+/// One entry of a modelling stack (twist, bend, mirror, round, …); same layout as Shape.
+struct Warp {
+    uint16_t kind = 0;
+    std::array<float, kMaxParams> params{};
+    friend bool operator==(const Warp&, const Warp&) = default;
+};
+
+/// What an edit or a tree node draws: a shape, or an object placed by reference, or (nodes only) a fold of children.
+/// local solid -> domain[0] -> domain[1] -> … -> transform -> parent's space.
+struct Node {
+    enum class Kind : uint8_t { Shape, Object, Fold };
+    Kind kind = Kind::Shape;
+    Shape shape;
+    ObjectId object;
+    Op op = Op::Union;                    ///< Fold: combines the children from left to right (never Paint)
+    float blend_radius = 0;               ///< Fold: in the node's own units
+    float material_blend_radius = 0;      ///< Fold: likewise, for materials
+    std::vector<uint32_t> children;       ///< Fold: indices into Object::nodes
+    Transform transform;
+    std::vector<Warp> domain;
+    MaterialId material;                  ///< none: the parent's
+    friend bool operator==(const Node&, const Node&) = default;
+};
+
+/// A reusable tree; nodes[0] is the root. Children always have higher indices than their parent.
+struct Object {
+    std::string name;
+    std::vector<Node> nodes;
+    friend bool operator==(const Object&, const Object&) = default;
+};
+
+/// One entry of the world's ordered list. `node.kind` is Shape or Object.
+struct Edit {
+    std::string name;                     ///< the scene file's `id`; unique in a world, made up when empty
+    Node node;
+    Op op = Op::Union;
+    float blend_radius = 0;               ///< world metres; the |a − b| where blending begins
+    float material_blend_radius = -1;     ///< world metres; negative: same as blend_radius
+    bool dynamic = false;                 ///< hint: moves often
+    bool hidden = false;                  ///< kept in the list, acts on nothing
+    std::string group;
+    friend bool operator==(const Edit&, const Edit&) = default;
+};
+
+}  // namespace kiln

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: MIT
+// World: an ordered list of edits, the objects, materials, lights and cameras beside it, and the field they make.
+//   kiln::World world;  world.add({.node = {.shape = kiln::Sphere{.radius = 1}}});  float d = world.distance({0, 2, 0});
+// A World is changed from its owner's thread; the const functions may be called from any thread between changes.
+#pragma once
+
+#include <kiln/edit.h>
+#include <kiln/query.h>
+#include <kiln/renderer.h>
+#include <kiln/result.h>
+#include <kiln/shapes.h>
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace kiln {
+
+struct FieldSettings {
+    float voxel_size = 0;                 ///< metres; 0: longest finite side / 256
+    int cells = 64;                       ///< a side per level, a power of two (clipmap levels; one level covers the edits)
+    int levels = 1;
+    std::optional<Box3> bounds;           ///< none: the finite edits', inflated by 10 %
+    bool distance_8bit = false;           ///< bricks store distance in 8 bits instead of 16
+};
+
+class World {
+public:
+    World();
+    World(World&&) noexcept;
+    World& operator=(World&&) noexcept;
+    ~World();
+
+    /// A scene file, or the name of a bundled scene. Errors read "FILE:LINE:COLUMN: path.to.key: what; what would be right".
+    static Result<World> load(const std::string& path_or_name);
+    static Result<World> parse(std::string_view json, const std::string& file_name);
+    /// Writes the whole scene; the old file stays until the new one is complete.
+    Result<void> save(const std::string& path) const;
+    std::string to_json() const;
+
+    MaterialId add_material(const std::string& name, const Material& material);
+    Result<ObjectId> add_object(Object object);
+    /// Appends an edit. Fails on NaN, sizes out of range, references to nothing.
+    Result<EditId> add(Edit edit);
+    Result<void> change(EditId id, Edit edit);
+    Result<void> remove(EditId id);
+    const Edit* find(EditId id) const;     ///< null when stale; valid until the next change
+    std::optional<EditId> find_edit(std::string_view name) const;
+    std::vector<EditId> edits() const;     ///< in order
+
+    FieldSettings field_settings;
+    std::vector<Light> lights;             ///< none: a default sun and sky
+    std::optional<Environment> environment;
+    std::vector<std::pair<std::string, Camera>> cameras;  ///< none: framed automatically
+
+    /// Exact distance of the ordered program, metres; +infinity in an empty world.
+    float distance(vec3 p_world) const;
+    FieldSample sample(vec3 p_world, FieldSource source = FieldSource::Exact) const;
+    std::vector<FieldSample> sample(std::span<const vec3> p_world, FieldSource source = FieldSource::Exact) const;
+    RayHit cast(const Ray& ray) const;
+    const Material* material(MaterialId id) const;
+    std::string_view material_name(MaterialId id) const;
+
+    /// Bounds of the solid of all finite edits, world metres; empty when there are none.
+    Box3 bounds() const;
+    /// What a renderer needs, with an immutable snapshot of the field. Camera by name; the first (or an automatic one) when empty.
+    Result<Frame> frame(std::string_view camera = {}) const;
+
+    /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
+    std::string inspect_json() const;
+
+    struct Impl;
+
+private:
+    std::unique_ptr<Impl> impl_;
+};
+
+/// Names and one-line descriptions of the scenes that come with Kiln.
+std::vector<std::pair<std::string, std::string>> bundled_scenes();
+/// JSON Schema (2020-12) of the scene format, made from the same tables as the reader.
+std::string scene_schema_json();
+/// The engine's version, "0.1.0".
+std::string_view version();
+
+/// How far two images are apart. Mean over pixels.
+struct ImageDifference {
+    double flip = 0;   ///< LDR-FLIP at 67 pixels per degree, 0 (same) to 1
+    double psnr = 0;   ///< dB, infinity when equal
+    double ssim = 0;   ///< 1 when equal
+    double max_abs = 0;///< largest channel difference, 0 to 1
+};
+Result<ImageDifference> compare_images(const std::string& a, const std::string& b);
+
+}  // namespace kiln
