@@ -28,9 +28,9 @@ class BarrierKey {
 //  - after a write, every further use needs a barrier, also the same kind of write; after reads, a write needs one;
 //  - before = every access since the last barrier, or a superset of it.
 struct Barrier {
-    BufferHandle buffer;
-    TextureHandle texture;
-    Subresources range;  // textures
+    BufferHandle buffer = {};
+    TextureHandle texture = {};
+    Subresources range = {};  // textures
     Access before = Access::Undefined;
     Access after = Access::Undefined;
     // Transients that share memory: accesses of the former owners to finish first. before is then Undefined.
@@ -38,7 +38,7 @@ struct Barrier {
 };
 
 struct BufferLayout {
-    BufferHandle buffer;
+    BufferHandle buffer = {};
     uint64_t offset = 0;
     uint32_t bytes_per_row = 0;   // 0: rows follow each other tightly
     uint32_t rows_per_layer = 0;  // 0: layers or slices follow each other tightly
@@ -51,23 +51,23 @@ struct Origin {
 };
 
 struct TexturePlace {
-    TextureHandle texture;
+    TextureHandle texture = {};
     uint32_t mip = 0;
-    Origin origin;
+    Origin origin = {};
 };
 
 enum class Load : uint8_t { Load, Clear, DontCare };
 enum class Store : uint8_t { Store, DontCare };
 
 struct ColorAttachment {
-    ViewHandle view;
+    ViewHandle view = {};
     Load load = Load::Clear;
     Store store = Store::Store;
     std::array<float, 4> clear{};
 };
 
 struct DepthAttachment {
-    ViewHandle view;  // none: no depth
+    ViewHandle view = {};  // none: no depth
     Load load = Load::Clear;
     Store store = Store::Store;
     float clear = 0.0f;  // far, in reversed depth
@@ -75,9 +75,9 @@ struct DepthAttachment {
 };
 
 struct RenderPassDesc {
-    std::span<const ColorAttachment> colors;
-    DepthAttachment depth;
-    std::string_view label;
+    std::span<const ColorAttachment> colors = {};
+    DepthAttachment depth = {};
+    std::string_view label = {};
 };
 
 class ComputePass {

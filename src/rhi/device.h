@@ -16,8 +16,8 @@ namespace kiln::rhi {
 
 // A texture upload. The device makes the transitions itself, for the whole subresource (mip, and layer of a D2Array).
 struct TextureWrite {
-    TexturePlace place;
-    Extent size;
+    TexturePlace place = {};
+    Extent size = {};
     uint32_t bytes_per_row = 0;   // of `bytes`; 0: tight
     uint32_t rows_per_layer = 0;
     Access before = Access::Undefined;  // state of the subresource now; Undefined discards what lies outside the region

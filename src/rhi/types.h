@@ -120,7 +120,7 @@ KILN_RHI_BITS(TextureUsage)
 // Memory for transient resources placed by hand; see BufferDesc::heap, TextureDesc::heap.
 struct HeapDesc {
     uint64_t size = 0;
-    std::string_view label;
+    std::string_view label = {};
 };
 
 struct MemoryNeed {
@@ -132,9 +132,9 @@ struct BufferDesc {
     uint64_t size = 0;  // bytes
     BufferUsage usage = BufferUsage::Storage | BufferUsage::CopySrc | BufferUsage::CopyDst;
     MemoryKind memory = MemoryKind::Device;
-    HeapHandle heap;  // with heap: the buffer lives at heap_offset of it, else in memory of its own
+    HeapHandle heap = {};  // with heap: the buffer lives at heap_offset of it, else in memory of its own
     uint64_t heap_offset = 0;
-    std::string_view label;
+    std::string_view label = {};
 };
 
 enum class Dimension : uint8_t { D1, D2, D2Array, D3 };
@@ -149,12 +149,12 @@ struct Extent {
 struct TextureDesc {
     Dimension dimension = Dimension::D2;
     Format format = Format::Rgba8Unorm;
-    Extent size;
+    Extent size = {};
     uint32_t mips = 1;
     TextureUsage usage = TextureUsage::Sampled | TextureUsage::Storage | TextureUsage::CopySrc | TextureUsage::CopyDst;
-    HeapHandle heap;
+    HeapHandle heap = {};
     uint64_t heap_offset = 0;
-    std::string_view label;
+    std::string_view label = {};
 };
 
 constexpr uint32_t kRemaining = ~0u;
@@ -169,10 +169,10 @@ struct Subresources {
 };
 
 struct ViewDesc {
-    TextureHandle texture;
-    Subresources range;
+    TextureHandle texture = {};
+    Subresources range = {};
     bool as_array = false;  // a D2Array texture's view is an array also when it has one layer; without: D2
-    std::string_view label;
+    std::string_view label = {};
 };
 
 enum class Filter : uint8_t { Nearest, Linear };
@@ -187,7 +187,7 @@ struct SamplerDesc {
     float lod_min = 0.0f;
     float lod_max = 32.0f;
     Compare compare = Compare::Never;  // other than Never: a comparison sampler
-    std::string_view label;
+    std::string_view label = {};
 };
 
 // ---- binding ---------------------------------------------------------------------------------------------------
@@ -198,7 +198,8 @@ enum class BindingKind : uint8_t {
     StorageBufferReadOnly, // `readonly buffer` in GLSL
     SampledTexture,        // `texture2D`, `texture3D`, `utexture2D` …; textures and samplers are always separate
     Sampler,
-    StorageTexture,        // `image3D` with an explicit format; readable only in formats a shader may read
+    StorageTexture,        // `image3D` with an explicit format; written (and read, if the shader does)
+    StorageTextureReadOnly, // `readonly image3D`
 };
 std::string_view name(BindingKind kind);
 
@@ -206,17 +207,16 @@ struct BindGroupLayoutEntry {
     uint32_t binding = 0;
     BindingKind kind = BindingKind::StorageBuffer;
     ShaderStage stages = ShaderStage::Compute;
-    Format format = Format::Undefined;  // StorageTexture: the format the shader declares
+    Format format = Format::Undefined;  // storage textures: the format the shader declares
     Dimension dimension = Dimension::D2;  // textures
     SampleType sample_type = SampleType::Float;  // SampledTexture; Float also accepts Depth32Float
-    bool write_only = false;  // StorageTexture, StorageBuffer: never read
     bool dynamic_offset = false;  // buffers: offset given at set_bind_group
     friend bool operator==(const BindGroupLayoutEntry&, const BindGroupLayoutEntry&) = default;
 };
 
 struct BindGroupLayoutDesc {
-    std::span<const BindGroupLayoutEntry> entries;
-    std::string_view label;
+    std::span<const BindGroupLayoutEntry> entries = {};
+    std::string_view label = {};
 };
 
 constexpr uint64_t kWholeSize = ~0ull;
@@ -224,30 +224,30 @@ constexpr uint64_t kWholeSize = ~0ull;
 // Exactly one of buffer, view, sampler.
 struct BindGroupEntry {
     uint32_t binding = 0;
-    BufferHandle buffer;
+    BufferHandle buffer = {};
     uint64_t offset = 0;
     uint64_t size = kWholeSize;
-    ViewHandle view;
-    SamplerHandle sampler;
+    ViewHandle view = {};
+    SamplerHandle sampler = {};
 };
 
 struct BindGroupDesc {
-    BindGroupLayout layout;
-    std::span<const BindGroupEntry> entries;
-    std::string_view label;
+    BindGroupLayout layout = {};
+    std::span<const BindGroupEntry> entries = {};
+    std::string_view label = {};
 };
 
 struct PipelineLayoutDesc {
-    std::span<const BindGroupLayout> groups;  // index = set; at most kMaxBindGroups
+    std::span<const BindGroupLayout> groups = {};  // index = set; at most kMaxBindGroups
     uint32_t push_bytes = 0;
-    std::string_view label;
+    std::string_view label = {};
 };
 
 // ---- pipelines -------------------------------------------------------------------------------------------------
 
 struct ShaderModuleDesc {
-    std::span<const uint32_t> spirv;
-    std::string_view label;
+    std::span<const uint32_t> spirv = {};
+    std::string_view label = {};
 };
 
 // Specialisation constant `layout(constant_id = id)`; a float's or an int's bits.
@@ -257,11 +257,11 @@ struct SpecConstant {
 };
 
 struct ComputePipelineDesc {
-    ShaderModule shader;
+    ShaderModule shader = {};
     std::string_view entry = "main";
-    PipelineLayout layout;  // none: made from the shader's reflected bindings; see pipeline_group_layout
-    std::span<const SpecConstant> constants;
-    std::string_view label;
+    PipelineLayout layout = {};  // none: made from the shader's reflected bindings; see pipeline_group_layout
+    std::span<const SpecConstant> constants = {};
+    std::string_view label = {};
 };
 
 enum class VertexFormat : uint8_t { Float32, Float32x2, Float32x3, Float32x4, Unorm8x4, Uint32 };
@@ -276,7 +276,7 @@ struct VertexAttribute {
 struct VertexBufferLayout {
     uint32_t stride = 0;
     bool per_instance = false;
-    std::span<const VertexAttribute> attributes;
+    std::span<const VertexAttribute> attributes = {};
 };
 
 enum class Topology : uint8_t { TriangleList, TriangleStrip, LineList, LineStrip, PointList };
@@ -294,8 +294,8 @@ struct BlendComponent {
 struct ColorTarget {
     Format format = Format::Rgba16Float;
     bool blend = false;
-    BlendComponent color;
-    BlendComponent alpha;
+    BlendComponent color = {};
+    BlendComponent alpha = {};
     uint8_t write_mask = 0xf;  // bit 0 red … bit 3 alpha
 };
 
@@ -306,24 +306,24 @@ struct DepthState {
 };
 
 struct RenderPipelineDesc {
-    ShaderModule vertex;
-    ShaderModule fragment;
+    ShaderModule vertex = {};
+    ShaderModule fragment = {};
     std::string_view vertex_entry = "main";
     std::string_view fragment_entry = "main";
-    PipelineLayout layout;  // none: made from the reflected bindings of both shaders
-    std::span<const VertexBufferLayout> vertex_buffers;
+    PipelineLayout layout = {};  // none: made from the reflected bindings of both shaders
+    std::span<const VertexBufferLayout> vertex_buffers = {};
     Topology topology = Topology::TriangleList;
     Cull cull = Cull::None;
     bool front_is_counter_clockwise = true;
-    std::span<const ColorTarget> colors;
-    DepthState depth;
-    std::span<const SpecConstant> constants;
-    std::string_view label;
+    std::span<const ColorTarget> colors = {};
+    DepthState depth = {};
+    std::span<const SpecConstant> constants = {};
+    std::string_view label = {};
 };
 
 struct QuerySetDesc {
     uint32_t count = 0;  // timestamps
-    std::string_view label;
+    std::string_view label = {};
 };
 
 // ---- what a device can do ----------------------------------------------------------------------------------------
@@ -377,14 +377,14 @@ enum class DeviceKind : uint8_t { Discrete, Integrated, Virtual, Cpu, Other };
 std::string_view name(DeviceKind kind);
 
 struct DeviceInfo {
-    std::string backend;  // "vulkan", "null"
-    std::string name;     // "llvmpipe (LLVM 15.0.6, 256 bits)"
-    std::string driver;   // "llvmpipe Mesa 22.3.6"
-    std::string api;      // "1.3.230"
+    std::string backend = {};  // "vulkan", "null"
+    std::string name = {};     // "llvmpipe (LLVM 15.0.6, 256 bits)"
+    std::string driver = {};   // "llvmpipe Mesa 22.3.6"
+    std::string api = {};      // "1.3.230"
     DeviceKind kind = DeviceKind::Other;
     uint64_t memory_bytes = 0;  // of device-local heaps
     bool usable = true;
-    std::string unusable_because;
+    std::string unusable_because = {};
 };
 
 struct MemoryStats {
