@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: MIT
+// Program: the world's ordered edits compiled to one register tape.
+//
+// The tape is a list of 8-byte instructions over 24 value registers, one point register P and the cell's point C. Every value
+// register holds, in world metres, a 1-Lipschitz function of the world point: scales and Lipschitz factors are folded into
+// each leaf's multiplier, so operands may be compared directly (architecture: "fields that never lie").
+// Register 0 carries the running result of the world list; each edit is evaluated into register 1 and combined.
+// The child that needs more registers goes first (Sethi and Ullman, "The Generation of Optimal Code for Arithmetic
+// Expressions", 1970), so 24 registers serve any tree of up to 2^22 leaves.
+#pragma once
+
+#include <kiln/edit.h>
+#include <kiln/result.h>
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace kiln::sdf {
+
+inline constexpr int kRegisters = 24;
+/// Distance of empty space: finite, so that no operation on it makes a NaN. Anything >= kEmptyTest means "nothing there".
+inline constexpr float kEmpty = 1e30f;
+inline constexpr float kEmptyTest = 1e29f;
+/// "No material": a subtract or intersect operand that leaves what was there. Real numbers are 0 … 65534.
+inline constexpr uint32_t kNoMaterial = 65535;
+
+// Instruction word: opcode 0-3, aux 4-11, dst 12-16, a 17-21, b 22-26. `param` indexes Program::params.
+enum class Opcode : uint32_t {
+    PointCell,       // P = C                                                 (starts a chain)
+    PointTranslate,  // P = C − t               t[3]                           (starts a chain)
+    PointAffine,     // P = M · (C − t)         t[3] M[9], row-major           (starts a chain)
+    PointAffineOn,   // P = M · (P − t)         t[3] M[9]
+    PointWarp,       // P = point_warp[aux](P)  its params
+    PointCopy,       // P = copy_warp[aux](P)   middle[3] second[3] its params
+    PointClamp,      // P = clamp(P, lo, hi)    lo[3] hi[3]
+    Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
+    Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
+    Bound,           // R[dst] = max(min(R[dst], m), s · distance(P, box))   s, m, lo[3] hi[3]
+    Combine,         // R[dst] = op[aux](R[a], R[b], k)            k, k of materials. aux = Op; Paint keeps R[a]'s distance
+    Move,            // R[dst] = R[a]
+    Negate,          // R[dst] = −R[a]
+    Empty,           // R[dst] = kEmpty, no material
+};
+
+struct Instruction {
+    uint32_t word;
+    uint32_t param;
+
+    static constexpr Instruction make(Opcode op, uint32_t aux, uint32_t dst, uint32_t a, uint32_t b, uint32_t param) {
+        return {uint32_t(op) | aux << 4 | dst << 12 | a << 17 | b << 22, param};
+    }
+    constexpr Opcode opcode() const { return Opcode(word & 15u); }
+    constexpr uint32_t aux() const { return (word >> 4) & 255u; }
+    constexpr uint32_t dst() const { return (word >> 12) & 31u; }
+    constexpr uint32_t a() const { return (word >> 17) & 31u; }
+    constexpr uint32_t b() const { return (word >> 22) & 31u; }
+    constexpr bool starts_chain() const { return opcode() <= Opcode::PointAffine; }
+    constexpr bool moves_point() const { return opcode() <= Opcode::PointClamp; }
+    friend bool operator==(const Instruction&, const Instruction&) = default;
+};
+static_assert(sizeof(Instruction) == 8);
+
+/// What the field needs to know of one edit.
+struct EditSpan {
+    uint32_t first = 0, count = 0;  ///< its instructions, the world Combine last
+    Box3 bounds;                    ///< of its solid, world metres; infinite faces for unbounded edits
+    float reach = 0;                ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
+    Op op = Op::Union;
+};
+
+struct Program {
+    std::vector<Instruction> code;  ///< [Empty R0] [edit 0] [edit 1] …; the result is R0
+    std::vector<float> params;
+    std::vector<float> samples;     ///< numbers of sampled shapes
+    std::vector<EditSpan> edits;    ///< same order as given; hidden edits have count 0 and empty bounds
+    Box3 bounds;                    ///< union of the finite edits' solids that add (union edits); empty when none
+    bool unbounded = false;         ///< some visible union edit has infinite bounds
+};
+
+/// Grid of a heightfield, row by row in z, values in [0, 1].
+struct HeightGrid {
+    int columns = 0, rows = 0;
+    std::vector<float> values;
+};
+
+/// What compile() reads.
+struct Source {
+    std::span<const Edit> edits;
+    std::span<const Object> objects;                     ///< ObjectId::index refers here
+    std::span<const HeightGrid> grids;                   ///< Shape::data of a sampled shape is the decimal index of its grid
+};
+
+/// Where compile() found a fault.
+struct Fault {
+    uint32_t edit = UINT32_MAX;    ///< the edit it came through
+    uint32_t object = UINT32_MAX;  ///< the object the node is in; UINT32_MAX: the edit's own node
+    uint32_t node = 0;
+    int warp = -1;                 ///< entry of the node's domain, -1: none
+};
+
+/// Compiles all edits. Fails on references to nothing, cycles, a repeat whose child does not fit its spacing, warps that need a
+/// bounded child, bends past their limit, and trees that expand to more than 2^22 leaves. `fault`, if given, says where.
+/// Parameter ranges are not checked here (see out_of_range). Any thread.
+Result<Program> compile(const Source& source, Fault* fault = nullptr);
+
+/// Bounds of one edit's solid in world metres, infinite faces where unbounded; the same faults as compile().
+Result<Box3> edit_bounds(const Source& source, uint32_t edit);
+
+}  // namespace kiln::sdf

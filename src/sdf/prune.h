@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+// Pruning: which instructions of a tape can matter inside a ball. The pruned tape has the full tape's bits at every point of the
+// ball: an operand is dropped only where the other one wins by more than both can change plus the blend radius
+// (Barbier et al., "Lipschitz Pruning: Hierarchical Simplification of Primitive-Based SDFs", 2025; ours is on registers, and
+// drops the whole prefix of a world list where a later edit wins).
+#pragma once
+
+#include "sdf/eval.h"
+
+#include <vector>
+
+namespace kiln::sdf {
+
+/// Reused between calls; holds no state that a caller may rely on.
+struct PruneScratch {
+    std::vector<float> left, right;
+    std::vector<Instruction> reversed;
+};
+
+/// Prunes `tape` for the ball of `radius` around `center` (world metres). Writes the kept code to `out` (cleared first) and
+/// returns the tape's value at the centre. Any thread, one scratch each.
+float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruction>& out, PruneScratch& scratch);
+
+}  // namespace kiln::sdf
