@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// What a brick is, in words both C++ and GLSL read: sizes, the cell word of the brick map, the brick record, material texels.
+// A brick holds 8x8x8 texels covering 7x7x7 voxels; neighbours share a face of texels. Texel i of the world lies at i * voxel_size
+// (i a global integer triple), so a shared texel has one position and one value whoever owns it.
+
+#ifdef __cplusplus
+#pragma once
+#include <cstdint>
+namespace kiln::field {
+using uint = uint32_t;
+#define KILN_CONST inline constexpr
+#else
+#define KILN_CONST const
+#endif
+
+KILN_CONST int kBrickTexels = 8;        // texels a side
+KILN_CONST int kBrickVoxels = 7;        // voxels (and texel steps) a side
+KILN_CONST int kBrickTexelCount = 512;
+KILN_CONST float kBandVoxels = 4.0f;    // stored distances are clamped to this many voxels
+KILN_CONST float kTrilinearErrorVoxels = 0.8661f;  // sqrt(3)/2: a trilinear value minus this is a lower bound of the distance
+
+// Cell word: occupied (bit 31) with the brick's slot in the low 24 bits; or empty, with its sign (bit 30: inside) and the jump.
+// jump: Chebyshev distance in cells to the nearest occupied cell, capped; every cell nearer than that is empty and of the same sign.
+KILN_CONST uint kCellOccupied = 0x80000000u;
+KILN_CONST uint kCellInside = 0x40000000u;
+KILN_CONST uint kCellSlotMask = 0x00ffffffu;
+KILN_CONST int kMaxJump = 7;
+
+// One per pool slot, in a storage buffer (32 bytes): where the brick is and which code describes it.
+struct BrickRecord {
+    int texel_x, texel_y, texel_z;  // global texel index of texel (0, 0, 0): 7 * cell
+    uint code_first;                // pruned code of the brick's ball, in instructions (8 bytes each)
+    uint code_count;                // 0: a free slot
+    uint pad_0, pad_1, pad_2;
+};
+
+// The grid (32 bytes): cell (x, y, z) of the world is at index ((z - cell_z) * size_y + (y - cell_y)) * size_x + (x - cell_x).
+struct GridParams {
+    int cell_x, cell_y, cell_z;     // first cell of the grid, in world cells of 7 voxels
+    float voxel_size;               // metres
+    int size_x, size_y, size_z;     // cells
+    uint atlas_bricks_x_y;          // bricks along x of the atlas in the low 16 bits, along y in the high; slot = (bz * by + y) * bx + x
+};
+
+// Material texel, 16 bits: palette slots (4 bits each) of the two heaviest materials and the second's share in [0, 1/2] as 0 … 255.
+// word = slot0 | slot1 << 4 | weight << 8; share = weight / 510. A brick's palette is 16 material numbers (kPaletteSize uints) at slot * 16.
+KILN_CONST int kPaletteSize = 16;
+
+#ifdef __cplusplus
+static_assert(sizeof(BrickRecord) == 32 && sizeof(GridParams) == 32);
+}  // namespace kiln::field
+#endif
+#undef KILN_CONST
