@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+#include "base/format.h"
+
+#include <fmt/args.h>
+#include <fmt/format.h>
+
+#include <exception>
+
+namespace kiln {
+
+std::string format_args(std::string_view pattern, std::initializer_list<FormatArg> args) {
+    try {
+        fmt::dynamic_format_arg_store<fmt::format_context> store;
+        for (const FormatArg& arg : args) {
+            std::visit(
+                [&](auto v) {
+                    if constexpr (std::is_same_v<decltype(v), std::string_view>) {
+                        store.push_back(fmt::string_view(v.data(), v.size()));
+                    } else {
+                        store.push_back(v);
+                    }
+                },
+                arg.value());
+        }
+        return fmt::vformat(fmt::string_view(pattern.data(), pattern.size()), store);
+    } catch (const std::exception& fault) {
+        return std::string(pattern) + " (bad format: " + fault.what() + ")";
+    }
+}
+
+}  // namespace kiln
