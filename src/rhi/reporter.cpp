@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#include "rhi/reporter.h"
+
+#include <cstdio>
+
+namespace kiln::rhi {
+
+void Reporter::set(ErrorSink sink) {
+    const std::lock_guard lock(mutex_);
+    sink_ = std::move(sink);
+}
+
+void Reporter::operator()(std::string_view sentence) {
+    const std::lock_guard lock(mutex_);
+    if (sink_) {
+        sink_(sentence);
+    } else {
+        std::fprintf(stderr, "rhi: %.*s\n", int(sentence.size()), sentence.data());
+    }
+}
+
+}  // namespace kiln::rhi
