@@ -33,8 +33,8 @@ function(kiln_samples)
     endforeach()
 endfunction()
 
-# tests/X/*_test.cpp (and helpers beside them) -> X_tests. Suites named *Gpu* get the label gpu, *Slow* slow, the others unit;
-# every test also has its folder's name as a label. Shaders in the folder are embedded as those of modules are.
+# tests/X/*_test.cpp (and helpers beside them) -> X_tests, run as X.Suite.Name. Suites named *Gpu* get the label gpu, *Slow* slow,
+# the others unit. Shaders in the folder are embedded as those of modules are.
 function(kiln_tests)
     find_package(GTest REQUIRED)
     find_package(rapidcheck REQUIRED)
@@ -56,7 +56,12 @@ function(kiln_tests)
         target_compile_definitions(${target} PRIVATE
             KILN_SOURCE_DIR="${PROJECT_SOURCE_DIR}" KILN_BINARY_DIR="${PROJECT_BINARY_DIR}" KILN_CXX="${CMAKE_CXX_COMPILER}"
             KILN_PROGRAM="${PROJECT_BINARY_DIR}/bin/kiln")
-        target_link_libraries(${target} PRIVATE ${modules} GTest::gmock GTest::gtest_main rapidcheck)
+        # Tests of a module see it and what is below it; others see everything.
+        set(tested ${modules})
+        if(TARGET kiln_${name} AND kiln_${name} IN_LIST modules)
+            set(tested kiln_${name})
+        endif()
+        target_link_libraries(${target} PRIVATE ${tested} GTest::gmock GTest::gtest_main rapidcheck)
         if(KILN_SANITIZE MATCHES "address")
             target_compile_definitions(${target} PRIVATE KILN_ADDRESS_SANITIZER)
         endif()
@@ -70,7 +75,7 @@ function(kiln_tests)
             set(label ${CMAKE_MATCH_1})
             set(filter ${CMAKE_MATCH_2})
             gtest_discover_tests(${target} TEST_FILTER "${filter}" TEST_PREFIX "${name}." TEST_LIST ${target}_${label}
-                DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 PROPERTIES LABELS "${label};${name}" TIMEOUT 300)
+                DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 300)
         endforeach()
     endforeach()
     kiln_shader_checks()

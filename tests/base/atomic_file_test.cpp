@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: MIT
+#include "base/atomic_file.h"
+
+#include <gtest/gtest.h>
+
+#include <sys/stat.h>
+
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace fs = std::filesystem;
+using kiln::AtomicFile;
+
+namespace {
+
+class AtomicFiles : public testing::Test {
+protected:
+    void SetUp() override {
+        std::string pattern = (fs::temp_directory_path() / "kiln_atomic_XXXXXX").string();
+        ASSERT_NE(mkdtemp(pattern.data()), nullptr);
+        folder = pattern;
+    }
+    void TearDown() override { fs::remove_all(folder); }
+
+    std::string path(const char* name) const { return (folder / name).string(); }
+    static std::string read(const std::string& file) {
+        std::ifstream in(file, std::ios::binary);
+        return {std::istreambuf_iterator<char>(in), {}};
+    }
+    size_t files() const { return size_t(std::distance(fs::directory_iterator(folder), {})); }
+
+    fs::path folder;
+};
+
+TEST_F(AtomicFiles, TheOldFileStaysUntilCommit) {
+    std::ofstream(path("a.txt")) << "old";
+    auto file = AtomicFile::create(path("a.txt"));
+    ASSERT_TRUE(file) << file.error().message;
+    ASSERT_TRUE(file->write("new and longer"));
+    std::fflush(file->stream());
+    EXPECT_EQ(read(path("a.txt")), "old");
+    ASSERT_TRUE(file->commit());
+    EXPECT_EQ(read(path("a.txt")), "new and longer");
+    EXPECT_EQ(files(), 1u) << "a temporary was left behind";
+}
+
+TEST_F(AtomicFiles, WithoutCommitNothingIsLeftBehind) {
+    {
+        auto file = AtomicFile::create(path("a.png"));
+        ASSERT_TRUE(file);
+        ASSERT_TRUE(file->write("half"));
+        EXPECT_EQ(fs::path(file->temporary_path()).extension(), ".png");
+        EXPECT_EQ(fs::path(file->temporary_path()).parent_path(), folder);
+        AtomicFile moved = std::move(*file);
+        EXPECT_EQ(files(), 1u);
+    }
+    EXPECT_EQ(files(), 0u);
+}
+
+TEST_F(AtomicFiles, AMissingFolderIsAnErrorAndIsNotMade) {
+    auto file = AtomicFile::create(path("none/a.txt"));
+    ASSERT_FALSE(file);
+    EXPECT_EQ(file.error().message, "cannot write " + path("none/a.txt") + ": No such file or directory");
+    EXPECT_EQ(file.error().kind, kiln::ErrorKind::Failed);
+    EXPECT_FALSE(fs::exists(folder / "none"));
+    EXPECT_FALSE(AtomicFile::create(folder.string()));
+    EXPECT_FALSE(AtomicFile::create(""));
+}
+
+TEST_F(AtomicFiles, AFullDiskIsReportedByCommit) {
+    if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+    auto file = AtomicFile::create("/dev/full");
+    ASSERT_TRUE(file);
+    (void)file->write("x");
+    const auto done = file->commit();
+    ASSERT_FALSE(done);
+    EXPECT_EQ(done.error().message, "cannot write /dev/full: No space left on device");
+    EXPECT_TRUE(fs::is_character_file("/dev/full"));
+}
+
+TEST_F(AtomicFiles, ADeviceIsWrittenToAndNotReplaced) {
+    auto file = AtomicFile::create("/dev/null");
+    ASSERT_TRUE(file);
+    ASSERT_TRUE(file->write("gone"));
+    ASSERT_TRUE(file->commit());
+    EXPECT_TRUE(fs::is_character_file("/dev/null"));
+}
+
+TEST_F(AtomicFiles, ALinkStaysALinkAndItsTargetChanges) {
+    std::ofstream(path("real.txt")) << "old";
+    fs::create_symlink("real.txt", path("link.txt"));
+    fs::create_symlink("later.txt", path("dangling.txt"));
+    for (const char* name : {"link.txt", "dangling.txt"}) {
+        auto file = AtomicFile::create(path(name));
+        ASSERT_TRUE(file);
+        ASSERT_TRUE(file->write("new"));
+        ASSERT_TRUE(file->commit());
+        EXPECT_TRUE(fs::is_symlink(path(name))) << name;
+    }
+    EXPECT_EQ(read(path("real.txt")), "new");
+    EXPECT_EQ(read(path("later.txt")), "new");
+}
+
+TEST_F(AtomicFiles, KeepsTheModeOfTheFileItReplaces) {
+    std::ofstream(path("a.sh")) << "old";
+    ASSERT_EQ(chmod(path("a.sh").c_str(), 0750), 0);
+    auto file = AtomicFile::create(path("a.sh"));
+    ASSERT_TRUE(file && file->write("new") && file->commit());
+    struct stat now;
+    ASSERT_EQ(stat(path("a.sh").c_str(), &now), 0);
+    EXPECT_EQ(now.st_mode & 07777, 0750u);
+}
+
+TEST_F(AtomicFiles, ASignalHandlerRemovesTemporaries) {
+    const pid_t child = fork();
+    ASSERT_GE(child, 0);
+    if (child == 0) {
+        std::signal(SIGINT, [](int) {
+            AtomicFile::remove_temporaries_from_signal();
+            _exit(130);
+        });
+        auto file = AtomicFile::create(path("a.png"));
+        auto done = AtomicFile::create(path("b.png"));
+        (void)done->commit();
+        std::raise(SIGINT);
+        _exit(1);
+    }
+    int status = 0;
+    ASSERT_EQ(waitpid(child, &status, 0), child);
+    EXPECT_EQ(WEXITSTATUS(status), 130);
+    EXPECT_FALSE(fs::exists(path("a.png")));
+    EXPECT_TRUE(fs::exists(path("b.png"))) << "a committed file was removed";
+    EXPECT_EQ(files(), 1u);
+}
+
+}  // namespace
