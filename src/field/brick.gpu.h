@@ -3,16 +3,12 @@
 // A brick holds 8x8x8 texels covering 7x7x7 voxels; neighbours share a face of texels. Texel i of the world lies at i * voxel_size
 // (i a global integer triple), so a shared texel has one position and one value whoever owns it.
 
-#ifdef __cplusplus
-#pragma once
-#include <cstdint>
-namespace kiln::field {
-using uint = uint32_t;
-#define KILN_CONST inline constexpr
-#else
-#define KILN_CONST const
-#endif
+#ifndef KILN_FIELD_BRICK_GPU_H
+#define KILN_FIELD_BRICK_GPU_H
 
+#include "field/words.gpu.h"
+
+KILN_FIELD_BEGIN
 KILN_CONST int kBrickTexels = 8;        // texels a side
 KILN_CONST int kBrickVoxels = 7;        // voxels (and texel steps) a side
 KILN_CONST int kBrickTexelCount = 512;
@@ -48,6 +44,7 @@ KILN_CONST int kPaletteSize = 16;
 
 #ifdef __cplusplus
 static_assert(sizeof(BrickRecord) == 32 && sizeof(GridParams) == 32);
-}  // namespace kiln::field
 #endif
-#undef KILN_CONST
+KILN_FIELD_END
+
+#endif
