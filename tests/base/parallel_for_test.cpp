@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <thread>
 #include <vector>
@@ -47,6 +48,20 @@ TEST(ParallelFor, NeverUsesMoreThreadsThanWorkers) {
         });
         EXPECT_LE(most, workers);
     }
+}
+
+TEST(ParallelFor, MayUseMoreThreadsThanCores) {
+    const int workers = kiln::hardware_workers() + 2;
+    std::atomic<int> inside = 0;
+    std::atomic<bool> all_met = false;
+    parallel_for(workers, workers, [&](int) {  // each waits until all are inside, or gives up
+        ++inside;
+        for (int i = 0; i < 2000 && !all_met; ++i) {
+            if (inside == workers) all_met = true;
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+    });
+    EXPECT_TRUE(all_met) << inside;
 }
 
 TEST(ParallelFor, MayBeNested) {
