@@ -19,6 +19,7 @@
 #define KILN_CONST inline constexpr
 #define KILN_FN inline
 #define KILN_OUT(type) type&
+#define KILN_INOUT(type) type&
 #define KILN_PRECISE
 
 namespace kiln::field {
@@ -45,6 +46,7 @@ using std::sqrt;
 #define KILN_CONST const
 #define KILN_FN
 #define KILN_OUT(type) out type
+#define KILN_INOUT(type) inout type
 #define KILN_PRECISE precise
 
 #endif

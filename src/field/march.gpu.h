@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+// The primary march: jump over empty cells, walk the voxels of each brick, solve the cubic in each. No stepping by distance.
+// The includer provides the field, before this text (C++: as members of the struct that includes it):
+//     uint field_cell(ivec3 cell)                   cell word; `cell` counts from the grid's first cell and is inside
+//     Corners field_corners(int slot, ivec3 voxel)  stored values, in voxels, at the corners of voxel 0 … 6 of a brick
+// Which voxels are looked at never changes what one of them answers, so a march with and without jumps finds the same hit.
+// In C++ this text is included inside a struct; it opens no namespace and includes nothing. Needs brick.gpu.h and cubic.gpu.h.
+
+// Plane through which a ray leaves voxel v of a brick; the brick's own faces are pushed out by kFaceOverlap.
+KILN_FN float voxel_exit_plane(int v, bool up) {
+    if (up) return v == kBrickVoxels - 1 ? float(kBrickVoxels) + kFaceOverlap : float(v + 1);
+    return v == 0 ? -kFaceOverlap : float(v);
+}
+
+// Voxels of one brick between t_min and t_max (voxels along the ray). True when hit; then t, voxel and p are set.
+KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_INOUT(MarchHit) hit) {
+    bool up_x = ray.direction.x > 0.0f;
+    bool up_y = ray.direction.y > 0.0f;
+    bool up_z = ray.direction.z > 0.0f;
+    // Neighbouring bricks round the crossing of their common face apart: each looks a little past it, so none leaves a gap.
+    float first = -kFaceOverlap;
+    float last = float(kBrickVoxels) + kFaceOverlap;
+    float enter = t_min - ray.t_base;
+    float leave = t_max - ray.t_base;
+    enter = max(enter, plane_crossing(up_x ? first : last, ray.high.x, ray.low.x, ray.inverse.x, -kFarVoxels));
+    enter = max(enter, plane_crossing(up_y ? first : last, ray.high.y, ray.low.y, ray.inverse.y, -kFarVoxels));
+    enter = max(enter, plane_crossing(up_z ? first : last, ray.high.z, ray.low.z, ray.inverse.z, -kFarVoxels));
+    leave = min(leave, plane_crossing(up_x ? last : first, ray.high.x, ray.low.x, ray.inverse.x, kFarVoxels));
+    leave = min(leave, plane_crossing(up_y ? last : first, ray.high.y, ray.low.y, ray.inverse.y, kFarVoxels));
+    leave = min(leave, plane_crossing(up_z ? last : first, ray.high.z, ray.low.z, ray.inverse.z, kFarVoxels));
+    if (enter > leave) return false;
+    ivec3 voxel;
+    voxel.x = int(floor(min(max((ray.high.x + ray.low.x) + ray.direction.x * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
+    voxel.y = int(floor(min(max((ray.high.y + ray.low.y) + ray.direction.y * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
+    voxel.z = int(floor(min(max((ray.high.z + ray.low.z) + ray.direction.z * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
+    for (int i = 0; i < 3 * kBrickVoxels + 3; i++) {
+        float out_x = plane_crossing(voxel_exit_plane(voxel.x, up_x), ray.high.x, ray.low.x, ray.inverse.x, kFarVoxels);
+        float out_y = plane_crossing(voxel_exit_plane(voxel.y, up_y), ray.high.y, ray.low.y, ray.inverse.y, kFarVoxels);
+        float out_z = plane_crossing(voxel_exit_plane(voxel.z, up_z), ray.high.z, ray.low.z, ray.inverse.z, kFarVoxels);
+        float out_any = min(min(out_x, out_y), out_z);
+        float exit = max(min(out_any, leave), enter);
+        hit.voxels++;
+        Cubic cubic = cubic_along(field_corners(slot, voxel), voxel_point(ray, voxel, enter), voxel_point(ray, voxel, exit));
+        float root = cubic_first_root(cubic);
+        if (root <= 1.0f) {
+            float s = enter + root * (exit - enter);
+            hit.t = ray.t_base + s;
+            hit.voxel = voxel;
+            hit.p = voxel_point(ray, voxel, s);
+            return true;
+        }
+        if (out_any >= leave) return false;
+        enter = exit;
+        if (out_any == out_x) voxel.x += up_x ? 1 : -1;
+        else if (out_any == out_y) voxel.y += up_y ? 1 : -1;
+        else voxel.z += up_z ? 1 : -1;
+        if (min(min(voxel.x, voxel.y), voxel.z) < 0 || max(max(voxel.x, voxel.y), voxel.z) >= kBrickVoxels) return false;
+    }
+    return false;
+}
+
+// Parameter at which the ray crosses the plane of texels number `texel` of an axis.
+KILN_FN float texel_plane_crossing(int texel, int whole, float part, float inverse, float parallel) {
+    return inverse == 0.0f ? parallel : (float(texel - whole) - part) * inverse;
+}
+
+// Cell that holds the coordinate at t.
+KILN_FN int cell_at(int whole, float part, float direction, float t) {
+    return int(floor((float(whole) + (part + direction * t)) / float(kBrickVoxels)));
+}
+
+// First hit between t_min >= 0 and t_max (voxels). `accelerate` false visits every cell.
+KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t_max, bool accelerate) {
+    MarchHit hit;
+    hit.state = kMarchMiss;
+    hit.t = t_max;
+    hit.slot = -1;
+    hit.cell = ivec3(0, 0, 0);
+    hit.voxel = ivec3(0, 0, 0);
+    hit.p = vec3(0.0f, 0.0f, 0.0f);
+    hit.cells = 0;
+    hit.voxels = 0;
+    bool up_x = ray.direction.x > 0.0f;
+    bool up_y = ray.direction.y > 0.0f;
+    bool up_z = ray.direction.z > 0.0f;
+    // From here on, texels and cells count from the grid's first.
+    ivec3 whole = ivec3(ray.whole.x - grid.cell_x * kBrickVoxels, ray.whole.y - grid.cell_y * kBrickVoxels,
+                        ray.whole.z - grid.cell_z * kBrickVoxels);
+    float t = t_min;
+    t = max(t, texel_plane_crossing(up_x ? 0 : grid.size_x * kBrickVoxels, whole.x, ray.part.x, ray.inverse.x, -kFarVoxels));
+    t = max(t, texel_plane_crossing(up_y ? 0 : grid.size_y * kBrickVoxels, whole.y, ray.part.y, ray.inverse.y, -kFarVoxels));
+    t = max(t, texel_plane_crossing(up_z ? 0 : grid.size_z * kBrickVoxels, whole.z, ray.part.z, ray.inverse.z, -kFarVoxels));
+    float end = t_max;
+    end = min(end, texel_plane_crossing(up_x ? grid.size_x * kBrickVoxels : 0, whole.x, ray.part.x, ray.inverse.x, kFarVoxels));
+    end = min(end, texel_plane_crossing(up_y ? grid.size_y * kBrickVoxels : 0, whole.y, ray.part.y, ray.inverse.y, kFarVoxels));
+    end = min(end, texel_plane_crossing(up_z ? grid.size_z * kBrickVoxels : 0, whole.z, ray.part.z, ray.inverse.z, kFarVoxels));
+    if (!(t <= end)) return hit;
+    ivec3 cell;
+    cell.x = cell_at(whole.x, ray.part.x, ray.direction.x, t);
+    cell.y = cell_at(whole.y, ray.part.y, ray.direction.y, t);
+    cell.z = cell_at(whole.z, ray.part.z, ray.direction.z, t);
+    if (ray.direction.x == 0.0f && (cell.x < 0 || cell.x >= grid.size_x)) return hit;
+    if (ray.direction.y == 0.0f && (cell.y < 0 || cell.y >= grid.size_y)) return hit;
+    if (ray.direction.z == 0.0f && (cell.z < 0 || cell.z >= grid.size_z)) return hit;
+    // On the other axes rounding may have put it just outside.
+    cell.x = min(max(cell.x, 0), grid.size_x - 1);
+    cell.y = min(max(cell.y, 0), grid.size_y - 1);
+    cell.z = min(max(cell.z, 0), grid.size_z - 1);
+    int most = grid.size_x + grid.size_y + grid.size_z + 3;
+    for (int i = 0; i < most; i++) {
+        hit.cells++;
+        uint word = field_cell(cell);
+        int reach = 0;  // cells around this one that are empty too
+        if ((word & kCellOccupied) != 0u) {
+            ivec3 world = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
+            ivec3 texel = ivec3(world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels);
+            int slot = int(word & kCellSlotMask);
+            if (march_brick(brick_ray(ray, texel), slot, t_min, t_max, hit)) {
+                hit.state = kMarchHit;
+                hit.slot = slot;
+                hit.cell = world;
+                return hit;
+            }
+        } else if ((word & kCellInside) != 0u) {
+            hit.state = kMarchInside;
+            hit.t = t;
+            hit.cell = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
+            return hit;
+        } else if (accelerate) {
+            reach = max(int(word & 7u) - 1, 0);
+        }
+        // Leave the cube of empty cells around this one.
+        int out_cell_x = up_x ? cell.x + reach + 1 : cell.x - reach;
+        int out_cell_y = up_y ? cell.y + reach + 1 : cell.y - reach;
+        int out_cell_z = up_z ? cell.z + reach + 1 : cell.z - reach;
+        float out_x = texel_plane_crossing(out_cell_x * kBrickVoxels, whole.x, ray.part.x, ray.inverse.x, kFarVoxels);
+        float out_y = texel_plane_crossing(out_cell_y * kBrickVoxels, whole.y, ray.part.y, ray.inverse.y, kFarVoxels);
+        float out_z = texel_plane_crossing(out_cell_z * kBrickVoxels, whole.z, ray.part.z, ray.inverse.z, kFarVoxels);
+        float out_any = min(min(out_x, out_y), out_z);
+        t = max(t, out_any);
+        if (t > t_max) return hit;
+        bool leave_x = out_any == out_x;
+        bool leave_y = !leave_x && out_any == out_y;
+        bool leave_z = !leave_x && !leave_y;
+        if (reach > 0) {  // the other axes may have moved within the cube
+            ivec3 from = cell;
+            if (!leave_x && ray.direction.x != 0.0f)
+                cell.x = min(max(cell_at(whole.x, ray.part.x, ray.direction.x, t), from.x - reach), from.x + reach);
+            if (!leave_y && ray.direction.y != 0.0f)
+                cell.y = min(max(cell_at(whole.y, ray.part.y, ray.direction.y, t), from.y - reach), from.y + reach);
+            if (!leave_z && ray.direction.z != 0.0f)
+                cell.z = min(max(cell_at(whole.z, ray.part.z, ray.direction.z, t), from.z - reach), from.z + reach);
+        }
+        if (leave_x) cell.x = up_x ? out_cell_x : out_cell_x - 1;
+        if (leave_y) cell.y = up_y ? out_cell_y : out_cell_y - 1;
+        if (leave_z) cell.z = up_z ? out_cell_z : out_cell_z - 1;
+        if (min(min(cell.x, cell.y), cell.z) < 0) return hit;
+        if (cell.x >= grid.size_x || cell.y >= grid.size_y || cell.z >= grid.size_z) return hit;
+    }
+    return hit;
+}
