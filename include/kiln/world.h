@@ -84,6 +84,11 @@ std::string scene_schema_json();
 /// The engine's version, "0.1.0".
 std::string_view version();
 
+/// The known word that someone who typed `word` most likely meant; empty when none is near.
+std::string_view nearest_word(std::string_view word, std::span<const std::string_view> known);
+/// Removes the temporaries of files that are being written. Only for signal handlers that end the program.
+void discard_unfinished_files() noexcept;
+
 /// How far two images are apart. Mean over pixels.
 struct ImageDifference {
     double flip = 0;   ///< LDR-FLIP at 67 pixels per degree, 0 (same) to 1

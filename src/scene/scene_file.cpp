@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: MIT
+// Reads a scene's sections in the order their references need, and checks references between them.
+
+#include "scene/scene_file.h"
+
+#include "scene/format.h"
+#include "scene/read_nodes.h"
+#include "scene/read_values.h"
+
+#include "base/format.h"
+
+#include <bit>
+#include <cmath>
+#include <unordered_map>
+#include <unordered_set>
+
+namespace kiln::scene {
+
+namespace {
+
+class SceneReader {
+public:
+    explicit SceneReader(SceneData& scene) : scene_(scene), doc_(scene.source), in_(scene.source), nodes_(in_, scene) {}
+
+    std::optional<Error> run() {
+        if (!sections()) return std::move(in_.error);
+        return std::nullopt;
+    }
+
+private:
+    std::optional<JsonIndex> section(std::string_view key) const { return doc_.find(0, key); }
+
+    bool sections() {
+        if (!doc_.is(0, JsonType::Object)) return in_.wrong_type(0, "an object, at least {\"format\": 1}");
+        // The version first: a file of a later one must not fail at its new keys.
+        if (const auto f = section("format"); f && doc_.is(*f, JsonType::Number) && doc_.number(*f) > 1)
+            return in_.fail(
+                *f, formatted("format {} is newer than this version reads; it reads format 1", doc_.source(*f)));
+        if (!in_.table(0, kSceneTable)) return false;
+        if (const auto d = section("description")) scene_.description = doc_.text(*d);
+        return field() && materials() && objects_and_edits() && lights() && environment() && cameras() &&
+               later_sections();
+    }
+
+    bool field() {
+        const auto at = section("field");
+        if (!at) return true;
+        FieldSettings& f = scene_.field;
+        if (!in_.table(*at, kFieldTable, &f.voxel_size)) return false;
+        if (const auto v = doc_.find(*at, "levels")) f.levels = int(doc_.number(*v));
+        if (const auto v = doc_.find(*at, "cells")) {
+            f.cells = int(doc_.number(*v));
+            if (!std::has_single_bit(uint32_t(f.cells)))
+                return in_.fail(
+                    *v, formatted("{} is not a power of two; use {}", f.cells, std::bit_floor(uint32_t(f.cells))));
+        }
+        if (const auto v = doc_.find(*at, "distance_8bit")) f.distance_8bit = doc_.is(*v, JsonType::True);
+        if (const auto v = doc_.find(*at, "bounds")) {
+            Box3 box;
+            const JsonIndex low = *doc_.find(*v, "min"), high = *doc_.find(*v, "max");
+            (void)in_.numbers(low, kBoundsTable.rows[0].numbers, &box.min.x);
+            (void)in_.numbers(high, kBoundsTable.rows[1].numbers, &box.max.x);
+            f.bounds = box;
+        }
+        return true;
+    }
+
+    bool materials() {
+        const auto at = section("materials");
+        if (!at) return true;
+        for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+            Material m;
+            if (!in_.table(c, kMaterialTable, &m.base_color.x)) return false;
+            scene_.materials.emplace_back(doc_.key(c), m);
+        }
+        if (scene_.materials.size() > 60000)
+            return in_.fail(*at, formatted("{} materials; at most 60000", scene_.materials.size()));
+        return nodes_.materials_by_name(at);
+    }
+
+    bool objects_and_edits() {
+        if (const auto at = section("objects"); at && !nodes_.objects(*at)) return false;
+        if (const auto at = section("edits"); at && !nodes_.edits(*at)) return false;
+        return true;
+    }
+
+    bool lights() {
+        const auto at = section("lights");
+        if (!at) return true;
+        for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+            Light light;
+            int kind = 0;
+            if (!in_.choice(*doc_.find(c, "type"), kLightNames, &kind)) return false;
+            light.kind = Light::Kind(kind);
+            if (light.kind == Light::Kind::Spot) light.direction = {0, -1, 0};
+            if (!in_.table(c, kLightTable, reinterpret_cast<float*>(&light), uint8_t(1u << kind),
+                           kLightNames[size_t(kind)]))
+                return false;
+            if (const auto d = doc_.find(c, "direction"); d && !(length(light.direction) > 1e-6f))
+                return in_.fail(*d, "a direction of length 0; write where the light goes, such as [0, -1, 0]");
+            if (light.kind == Light::Kind::Spot && light.inner_deg > light.outer_deg)
+                return in_.fail(c, formatted("inner_deg {} is above outer_deg {}; it must not be",
+                                             shortest(light.inner_deg), shortest(light.outer_deg)));
+            scene_.lights.push_back(light);
+        }
+        return true;
+    }
+
+    bool environment() {
+        const auto at = section("environment");
+        if (!at) return true;
+        Environment e;
+        if (!in_.table(*at, kEnvironmentTable, &e.color.x)) return false;
+        scene_.environment = e;
+        if (doc_.find(*at, "file")) scene_.undrawn.push_back("environment.file");
+        return true;
+    }
+
+    bool cameras() {
+        const auto at = section("cameras");
+        if (!at) return true;
+        for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+            Camera camera;
+            if (!in_.table(c, kCameraTable, &camera.position.x)) return false;
+            if (const auto t = doc_.find(c, "tone_map")) {
+                int map = 0;
+                if (!in_.choice(*t, kToneMapNames, &map)) return false;
+                camera.tone_map = ToneMap(map);
+            }
+            const vec3 forward = camera.target - camera.position;
+            if (!(length(forward) > 0)) return in_.fail(c, "position and target are the same point; move one of them");
+            if (const auto u = doc_.find(c, "up"); u && !(length(camera.up) > 1e-6f))
+                return in_.fail(*u, "an up of length 0; write [0, 1, 0]");
+            scene_.cameras.emplace_back(doc_.key(c), camera);
+        }
+        return true;
+    }
+
+    // Ids of a list, each once.
+    bool ids(std::string_view list, std::unordered_map<std::string_view, uint32_t>& out) {
+        const auto at = section(list);
+        if (!at) return true;
+        if (doc_.first(*at) != doc_.next(*at)) scene_.undrawn.emplace_back(list);
+        uint32_t n = 0;
+        for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c), ++n) {
+            const JsonIndex id = *doc_.find(c, "id");
+            if (doc_.text(id).empty()) return in_.fail(id, "an empty id; give it a name");
+            if (const auto [old, fresh] = out.emplace(doc_.text(id), n); !fresh)
+                return in_.fail(id,
+                                formatted("{}[{}] has this id too; ids are unique, choose another", list, old->second));
+        }
+        return true;
+    }
+
+    bool later_sections() {
+        std::unordered_map<std::string_view, uint32_t> meshes, bodies, triggers, cloths, fluids, edit_ids, object_names;
+        if (!ids("meshes", meshes) || !ids("bodies", bodies) || !ids("triggers", triggers) || !ids("cloths", cloths) ||
+            !ids("fluids", fluids))
+            return false;
+        const auto known = [](const auto& map) {
+            std::vector<std::string_view> names;
+            for (const auto& [name, n] : map) names.push_back(name);
+            std::sort(names.begin(), names.end());
+            return names;
+        };
+        if (const auto at = section("bodies")) {
+            for (uint32_t i = 0; i < scene_.edits.size(); ++i) edit_ids.emplace(scene_.edits[i].name, i);
+            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+                const auto edits = doc_.find(c, "edits"), mesh = doc_.find(c, "mesh");
+                if (bool(edits) == bool(mesh))
+                    return in_.fail(c, "a body has either \"edits\" or a \"mesh\"; give it one of them");
+                if (mesh && !meshes.contains(doc_.text(*mesh))) return in_.unknown_name(*mesh, "mesh", known(meshes));
+                if (!edits) continue;
+                if (doc_.first(*edits) == doc_.next(*edits)) return in_.fail(*edits, "no edits; name at least one");
+                for (JsonIndex e = doc_.first(*edits); e < doc_.next(*edits); e = doc_.next(e))
+                    if (!edit_ids.contains(doc_.text(e))) return in_.unknown_name(e, "edit", known(edit_ids));
+            }
+        }
+        if (const auto at = section("triggers")) {
+            for (uint32_t i = 0; i < scene_.objects.size(); ++i) object_names.emplace(scene_.objects[i].name, i);
+            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c))
+                if (const JsonIndex o = *doc_.find(c, "object"); !object_names.contains(doc_.text(o)))
+                    return in_.unknown_name(o, "object", known(object_names));
+        }
+        return true;
+    }
+
+    SceneData& scene_;
+    const JsonDocument& doc_;
+    ValueReader in_;
+    NodeReader nodes_;
+};
+
+}  // namespace
+
+Result<SceneData> read_scene(std::string text, const std::string& name) {
+    auto document = JsonDocument::parse(std::move(text), name);
+    if (!document) return document.error();
+    SceneData scene;
+    scene.source = std::move(*document);
+    if (const size_t slash = name.find_last_of('/'); slash != std::string::npos)
+        scene.folder = name.substr(0, slash + 1);
+    if (auto error = SceneReader(scene).run()) return std::move(*error);
+    return scene;
+}
+
+}  // namespace kiln::scene

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Scene files: NAME.kiln.json to data and back. Nothing is compiled or drawn here.
+#pragma once
+
+#include "scene/json_source.h"
+#include "sdf/program.h"
+
+#include <kiln/world.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace kiln::scene {
+
+/// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
+/// sections that the engine does not act on yet, and how it wrote what has two forms.
+struct SceneData {
+    JsonDocument source;
+    std::string folder;  ///< paths in the scene are relative to it; empty: the current folder
+    std::string description;
+    FieldSettings field;
+    std::vector<std::pair<std::string, Material>> materials;  ///< MaterialId::index refers here
+    std::vector<Object> objects;                              ///< ObjectId::index refers here
+    std::vector<Edit> edits;
+    std::vector<Light> lights;
+    std::optional<Environment> environment;
+    std::vector<std::pair<std::string, Camera>> cameras;
+
+    // Where things stand in `source`; kNowhere for what was added later.
+    static constexpr JsonIndex kNowhere = UINT32_MAX;
+    std::vector<JsonIndex> edit_places;
+    std::vector<std::vector<JsonIndex>> object_places;  ///< by object, by node
+
+    /// Sections with content that this version keeps but does not draw, "meshes", "bodies", …
+    std::vector<std::string> undrawn;
+};
+
+/// Errors read "NAME:LINE:COLUMN: path.to.key: what is wrong; what would be right".
+Result<SceneData> read_scene(std::string text, const std::string& name);
+/// The scene as it is saved. Canonical: reading it and writing it again gives the same bytes.
+std::string write_scene(const SceneData& scene);
+
+/// A fault of one edit or object given by code; nothing when the reader would accept it.
+std::optional<Error> check_edit(const Edit& edit, size_t objects, size_t materials);
+std::optional<Error> check_object(const Object& object, size_t objects, size_t materials);
+
+}  // namespace kiln::scene

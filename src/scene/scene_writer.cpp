@@ -1,0 +1,355 @@
+// SPDX-License-Identifier: MIT
+// Writes a scene: keys in the order of the file it came from, new keys in the order of the tables, shortest numbers.
+// A default is written only where the file had it.
+
+#include "scene/scene_file.h"
+
+#include "scene/format.h"
+
+#include <cstring>
+#include <unordered_map>
+
+namespace kiln::scene {
+
+namespace {
+
+constexpr JsonIndex kNowhere = SceneData::kNowhere;
+using Members = std::vector<std::pair<std::string_view, JsonIndex>>;  // key, where it stood
+
+class SceneWriter {
+public:
+    explicit SceneWriter(const SceneData& scene) : scene_(scene), old_(scene.source) {}
+
+    std::string run() {
+        out_.open(JsonType::Object);
+        std::vector<std::string_view> keys;
+        for (const KeyRow& row : kSceneTable.rows) keys.push_back(row.name);
+        for (const auto& [key, at] : members(old_.empty() ? kNowhere : 0, keys)) section(key, at);
+        out_.close();
+        return out_.print();
+    }
+
+private:
+    // The old object's keys in its order, then those of `keys` that it lacked.
+    Members members(JsonIndex object, const std::vector<std::string_view>& keys) const {
+        Members list;
+        if (object != kNowhere)
+            for (JsonIndex c = old_.first(object); c < old_.next(object); c = old_.next(c))
+                list.emplace_back(old_.key(c), c);
+        const size_t had = list.size();
+        for (const std::string_view key : keys) {
+            bool known = false;
+            for (size_t i = 0; i < had && !known; ++i) known = list[i].first == key;
+            if (!known) list.emplace_back(key, kNowhere);
+        }
+        return list;
+    }
+    Members members(JsonIndex object, const Table& table) const {
+        std::vector<std::string_view> keys;
+        for (const KeyRow& row : table.rows) keys.push_back(row.name);
+        return members(object, keys);
+    }
+    void keep(std::string_view key, JsonIndex at) {
+        if (at != kNowhere) out_.add_copy(old_, at, key);
+    }
+
+    void numbers(std::string_view key, JsonIndex at, const float* values, int count) {
+        bool same = true;
+        for (int k = 1; k < count; ++k) same = same && values[k] == values[0];
+        if (count == 1 || (same && at != kNowhere && old_.is(at, JsonType::Number)))
+            return out_.add_float(values[0], key);
+        out_.open(JsonType::Array, key);
+        for (int k = 0; k < count; ++k) out_.add_float(values[k]);
+        out_.close();
+    }
+    void number_row(const KeyRow& row, JsonIndex at, const float* floats) {
+        const float* v = floats + row.numbers.offset;
+        const bool is_default =
+            std::memcmp(v, row.numbers.defaults.data(), sizeof(float) * size_t(row.numbers.arity)) == 0;
+        if (at != kNowhere || !is_default) numbers(row.name, at, v, row.numbers.arity);
+    }
+    void text(std::string_view key, JsonIndex at, std::string_view value, std::string_view fallback) {
+        if (at != kNowhere || value != fallback) out_.add_text(value, key);
+    }
+    void flag(std::string_view key, JsonIndex at, bool value) {
+        if (at != kNowhere || value) out_.add_bool(value, key);
+    }
+
+    void section(std::string_view key, JsonIndex at) {
+        if (key == "format") return out_.add_number(1, key);
+        if (key == "description") {
+            if (!scene_.description.empty() || at != kNowhere) out_.add_text(scene_.description, key);
+        } else if (key == "field") {
+            field(at);
+        } else if (key == "materials") {
+            named(key, at, scene_.materials, [&](const Material& m, JsonIndex was) {
+                for (const auto& [k, w] : members(was, kMaterialTable))
+                    number_row(*find_row(kMaterialTable, k), w, &m.base_color.x);
+            });
+        } else if (key == "objects") {
+            objects(at);
+        } else if (key == "edits") {
+            edits(at);
+        } else if (key == "lights") {
+            lights(at);
+        } else if (key == "environment") {
+            environment(at);
+        } else if (key == "cameras") {
+            named(key, at, scene_.cameras, [&](const Camera& c, JsonIndex was) { camera(c, was); });
+        } else {
+            keep(key, at);
+        }
+    }
+
+    void field(JsonIndex at) {
+        const FieldSettings& f = scene_.field;
+        if (at == kNowhere && f.voxel_size <= 0 && f.cells == 64 && f.levels == 1 && !f.bounds && !f.distance_8bit)
+            return;
+        out_.open(JsonType::Object, "field");
+        for (const auto& [key, was] : members(at, kFieldTable)) {
+            if (key == "voxel_size" && f.voxel_size > 0) out_.add_float(f.voxel_size, key);
+            if (key == "levels" && (was != kNowhere || f.levels != 1)) out_.add_number(f.levels, key);
+            if (key == "cells" && (was != kNowhere || f.cells != 64)) out_.add_number(f.cells, key);
+            if (key == "distance_8bit") flag(key, was, f.distance_8bit);
+            if (key == "bounds" && f.bounds) {
+                out_.open(JsonType::Object, key);
+                for (const auto& [k, w] : members(was, kBoundsTable))
+                    numbers(k, kNowhere, k == "min" ? &f.bounds->min.x : &f.bounds->max.x, 3);
+                out_.close();
+            }
+        }
+        out_.close();
+    }
+
+    // A map section: old names keep their place, new ones follow in their order.
+    template <typename T, typename WriteOne>
+    void named(std::string_view key, JsonIndex at, const std::vector<std::pair<std::string, T>>& items,
+               WriteOne write) {
+        if (at == kNowhere && items.empty()) return;
+        out_.open(JsonType::Object, key);
+        std::unordered_map<std::string_view, const T*> by_name;
+        std::vector<std::string_view> names;
+        for (const auto& [name, item] : items) {
+            by_name.emplace(name, &item);
+            names.push_back(name);
+        }
+        std::unordered_map<std::string_view, JsonIndex> had;
+        if (at != kNowhere)
+            for (JsonIndex c = old_.first(at); c < old_.next(at); c = old_.next(c)) had.emplace(old_.key(c), c);
+        for (const std::string_view name : names) {
+            const auto was = had.find(name);
+            out_.open(JsonType::Object, name);
+            write(*by_name[name], was == had.end() ? kNowhere : was->second);
+            out_.close();
+        }
+        out_.close();
+    }
+
+    void camera(const Camera& c, JsonIndex was) {
+        for (const auto& [k, w] : members(was, kCameraTable)) {
+            if (k == "tone_map") {
+                text(k, w, kToneMapNames[size_t(c.tone_map)], "aces");
+            } else {
+                number_row(*find_row(kCameraTable, k), w, &c.position.x);
+            }
+        }
+    }
+
+    void lights(JsonIndex at) {
+        if (at == kNowhere && scene_.lights.empty()) return;
+        out_.open(JsonType::Array, "lights");
+        JsonIndex was = at == kNowhere ? kNowhere : old_.first(at);
+        for (const Light& light : scene_.lights) {
+            const bool known = was != kNowhere && was < old_.next(at);
+            out_.open(JsonType::Object);
+            const auto bit = uint8_t(1u << int(light.kind));
+            for (const auto& [k, w] : members(known ? was : kNowhere, kLightTable)) {
+                const KeyRow& row = *find_row(kLightTable, k);
+                if (!(row.kinds & bit)) continue;
+                if (k == "type") {
+                    out_.add_text(kLightNames[size_t(light.kind)], k);
+                } else if (k == "direction" && light.kind == Light::Kind::Spot) {
+                    numbers(k, w, &light.direction.x, 3);  // its default is not the table's
+                } else {
+                    number_row(row, w, reinterpret_cast<const float*>(&light));
+                }
+            }
+            out_.close();
+            if (known) was = old_.next(was);
+        }
+        out_.close();
+    }
+
+    void environment(JsonIndex at) {
+        if (!scene_.environment) return;
+        out_.open(JsonType::Object, "environment");
+        for (const auto& [k, w] : members(at, kEnvironmentTable)) {
+            if (k == "file") {
+                keep(k, w);
+            } else {
+                number_row(*find_row(kEnvironmentTable, k), w, &scene_.environment->color.x);
+            }
+        }
+        out_.close();
+    }
+
+    // Keys of an edit (edit given) or of a tree node.
+    Members node_members(const Node& node, const Edit* edit, JsonIndex at) const {
+        std::vector<std::string_view> keys;
+        if (edit) keys.push_back("id");
+        keys.push_back(node.kind == Node::Kind::Shape ? "shape" : "object");
+        if (node.kind == Node::Kind::Fold) keys.back() = "op";
+        if (node.kind == Node::Kind::Shape) {
+            for (const sdf::FieldRow& f : sdf::shape_rows()[node.shape.kind].fields()) keys.push_back(f.name);
+            keys.push_back("file");
+        }
+        for (const char* key :
+             {"op", "blend_radius", "material_blend_radius", "position", "rotation", "scale", "domain", "material"})
+            if (keys.back() != key) keys.push_back(key);
+        if (edit) {
+            for (const char* key : {"dynamic", "hidden", "group", "outline"}) keys.push_back(key);
+        }
+        if (node.kind == Node::Kind::Fold) keys.push_back("children");
+        return members(at, keys);
+    }
+
+    void domain(std::string_view key, JsonIndex at, const std::vector<Warp>& warps) {
+        if (warps.empty() && at == kNowhere) return;
+        out_.open(JsonType::Array, key);
+        JsonIndex was = at == kNowhere ? kNowhere : old_.first(at);
+        for (const Warp& warp : warps) {
+            const sdf::KindRow& row = sdf::warp_rows()[warp.kind];
+            const bool known = was != kNowhere && was < old_.next(at) && old_.find(was, "warp") &&
+                               old_.text(*old_.find(was, "warp")) == row.name;
+            std::vector<std::string_view> keys{"warp"};
+            for (const sdf::FieldRow& f : row.fields()) keys.push_back(f.name);
+            out_.open(JsonType::Object);
+            for (const auto& [k, w] : members(known ? was : kNowhere, keys)) {
+                if (k == "warp") {
+                    out_.add_text(row.name, k);
+                } else {
+                    parameter(k, w, row, warp.params.data());
+                }
+            }
+            out_.close();
+            if (was != kNowhere && was < old_.next(at)) was = old_.next(was);
+        }
+        out_.close();
+    }
+
+    void parameter(std::string_view key, JsonIndex at, const sdf::KindRow& row, const float* params) {
+        for (const sdf::FieldRow& f : row.fields()) {
+            if (f.name != key || f.range == "internal") continue;
+            if (f.range == "axis") return out_.add_text(kAxisNames[size_t(params[f.offset])], key);
+            return numbers(key, at, params + f.offset, f.arity);
+        }
+    }
+
+    void node_key(std::string_view key, JsonIndex at, const Node& node, const Edit* edit) {
+        const bool folds = edit || node.kind == Node::Kind::Fold;
+        const Transform& t = node.transform;
+        const auto put = [&](const float* v, int count, bool is_default) {
+            if (at != kNowhere || !is_default) numbers(key, at, v, count);
+        };
+        if (key == "id") return out_.add_text(edit->name, key);
+        if (key == "shape" && node.kind == Node::Kind::Shape)
+            return out_.add_text(sdf::shape_rows()[node.shape.kind].name, key);
+        if (key == "object" && node.kind == Node::Kind::Object)
+            return out_.add_text(scene_.objects[node.object.index].name, key);
+        if (key == "file" && node.kind == Node::Kind::Shape && !node.shape.data.empty())
+            return out_.add_text(node.shape.data, key);
+        if (key == "op" && folds) return text(key, at, kOpNames[size_t(edit ? edit->op : node.op)], "union");
+        if (key == "blend_radius" && folds) {
+            const float k = edit ? edit->blend_radius : node.blend_radius;
+            return put(&k, 1, k == 0);
+        }
+        if (key == "material_blend_radius" && folds) {
+            const float k = edit ? edit->material_blend_radius : node.material_blend_radius;
+            const bool linked = edit ? k < 0 : k == node.blend_radius && at == kNowhere;
+            return linked ? void() : numbers(key, at, &k, 1);
+        }
+        if (key == "position") return put(&t.position.x, 3, t.position == vec3{});
+        if (key == "rotation") return put(&t.rotation.x, 4, t.rotation == quat{});
+        if (key == "scale") return put(&t.scale.x, 3, t.scale == vec3{1, 1, 1});
+        if (key == "domain") return domain(key, at, node.domain);
+        if (key == "material")
+            return node.material ? out_.add_text(scene_.materials[node.material.index].first, key) : void();
+        if (edit && key == "dynamic") return flag(key, at, edit->dynamic);
+        if (edit && key == "hidden") return flag(key, at, edit->hidden);
+        if (edit && key == "group") return text(key, at, edit->group, "");
+        if (edit && key == "outline") return keep(key, at);
+        if (node.kind == Node::Kind::Shape)
+            parameter(key, at, sdf::shape_rows()[node.shape.kind], node.shape.params.data());
+    }
+
+    // Trees may be deeper than a stack of calls.
+    void tree(const Object& object, const std::vector<JsonIndex>& places) {
+        struct Open {
+            uint32_t node;
+            Members keys;
+            size_t at = 0, child = 0;
+            bool in_children = false;
+        };
+        const auto place = [&](uint32_t n) { return n < places.size() ? places[n] : kNowhere; };
+        std::vector<Open> stack;
+        const auto enter = [&](uint32_t n, std::string_view key) {
+            out_.open(JsonType::Object, key);
+            stack.push_back({n, node_members(object.nodes[n], nullptr, place(n))});
+        };
+        enter(0, object.name);
+        while (!stack.empty()) {
+            Open& top = stack.back();
+            const Node& node = object.nodes[top.node];
+            if (top.in_children) {
+                if (top.child < node.children.size()) {
+                    enter(node.children[top.child++], {});
+                    continue;
+                }
+                out_.close();
+                top.in_children = false;
+                ++top.at;
+            } else if (top.at == top.keys.size()) {
+                out_.close();
+                stack.pop_back();
+            } else if (top.keys[top.at].first == "children" && node.kind == Node::Kind::Fold) {
+                out_.open(JsonType::Array, "children");
+                top.in_children = true;
+            } else {
+                node_key(top.keys[top.at].first, top.keys[top.at].second, node, nullptr);
+                ++top.at;
+            }
+        }
+    }
+
+    void objects(JsonIndex at) {
+        if (at == kNowhere && scene_.objects.empty()) return;
+        static const std::vector<JsonIndex> kNone;
+        out_.open(JsonType::Object, "objects");
+        for (size_t i = 0; i < scene_.objects.size(); ++i)
+            tree(scene_.objects[i], i < scene_.object_places.size() ? scene_.object_places[i] : kNone);
+        out_.close();
+    }
+
+    void edits(JsonIndex at) {
+        if (at == kNowhere && scene_.edits.empty()) return;
+        out_.open(JsonType::Array, "edits");
+        for (size_t i = 0; i < scene_.edits.size(); ++i) {
+            const Edit& edit = scene_.edits[i];
+            out_.open(JsonType::Object);
+            const JsonIndex was = i < scene_.edit_places.size() ? scene_.edit_places[i] : kNowhere;
+            for (const auto& [key, w] : node_members(edit.node, &edit, was)) node_key(key, w, edit.node, &edit);
+            out_.close();
+        }
+        out_.close();
+    }
+
+    const SceneData& scene_;
+    const JsonDocument& old_;
+    JsonDocument out_;
+};
+
+}  // namespace
+
+std::string write_scene(const SceneData& scene) { return SceneWriter(scene).run(); }
+
+}  // namespace kiln::scene
