@@ -68,7 +68,7 @@ struct Node {
     ObjectId object;
     Op op = Op::Union;                    ///< Fold: combines the children from left to right (never Paint)
     float blend_radius = 0;               ///< Fold: in the node's own units
-    float material_blend_radius = 0;      ///< Fold: likewise, for materials
+    float material_blend_radius = -1;     ///< Fold: likewise, for materials; negative: same as blend_radius
     std::vector<uint32_t> children;       ///< Fold: indices into Object::nodes
     Transform transform;
     std::vector<Warp> domain;

@@ -45,7 +45,7 @@ void evaluate(const TapeView& tape, const Points& points, float* out, Isa isa = 
 /// Also the two heaviest materials. With `edits`, numbers of edits instead of materials (every operand counts).
 void evaluate_materials(const TapeView& tape, const Points& points, float* out, MaterialMix* mix, bool edits = false,
                         Isa isa = best_isa());
-/// One point in double precision.
-double evaluate(const TapeView& tape, dvec3 p_world);
+/// One point in double precision; the materials (or edits) too when `mix` is given.
+double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix = nullptr, bool edits = false);
 
 }  // namespace kiln::sdf

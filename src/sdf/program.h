@@ -22,8 +22,11 @@ inline constexpr int kRegisters = 24;
 /// Distance of empty space: finite, so that no operation on it makes a NaN. Anything >= kEmptyTest means "nothing there".
 inline constexpr float kEmpty = 1e30f;
 inline constexpr float kEmptyTest = 1e29f;
-/// "No material": a subtract or intersect operand that leaves what was there. Real numbers are 0 … 65534.
+/// "No material": a subtract or intersect operand that leaves what was there. Others are 0 … 65534.
 inline constexpr uint32_t kNoMaterial = 65535;
+/// Material numbers in tapes and bricks: 0 is the default grey, MaterialId::index + 1 the rest.
+inline constexpr uint32_t kDefaultMaterial = 0;
+inline constexpr uint32_t material_number(MaterialId id) { return id ? id.index + 1 : kDefaultMaterial; }
 
 // Instruction word: opcode 0-3, aux 4-11, dst 12-16, a 17-21, b 22-26. `param` indexes Program::params.
 enum class Opcode : uint32_t {
@@ -37,11 +40,16 @@ enum class Opcode : uint32_t {
     Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
     Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
     Bound,           // R[dst] = max(min(R[dst], m), s · distance(P, box))   s, m, lo[3] hi[3]
-    Combine,         // R[dst] = op[aux](R[a], R[b], k)            k, k of materials. aux = Op; Paint keeps R[a]'s distance
+    Combine,         // R[dst] = op[aux & 3](R[a], R[b], k)        k, k of materials. aux & 3 = Op (Paint keeps R[a]'s distance);
+                     //                                            aux & kMayLackMaterial: R[b] may carry no material
     Move,            // R[dst] = R[a]
     Negate,          // R[dst] = −R[a]
     Empty,           // R[dst] = kEmpty, no material
+    // Only in pruned code, where R[b] won a Combine by distance but what R[a] was made of still shows through:
+    Take,            // R[dst] = R[b] (aux 0) or −R[b] (aux 1); material: R[b]'s, or R[a]'s where R[b] has none
+    Constant,        // R[dst] = 0 with the material (edit) of the Shape at param: only its material is looked at
 };
+inline constexpr uint32_t kMayLackMaterial = 4;
 
 struct Instruction {
     uint32_t word;
@@ -104,7 +112,5 @@ struct Fault {
 /// Parameter ranges are not checked here (see out_of_range). Any thread.
 Result<Program> compile(const Source& source, Fault* fault = nullptr);
 
-/// Bounds of one edit's solid in world metres, infinite faces where unbounded; the same faults as compile().
-Result<Box3> edit_bounds(const Source& source, uint32_t edit);
 
 }  // namespace kiln::sdf

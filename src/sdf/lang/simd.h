@@ -50,12 +50,13 @@ KILN_SDF real select(mask m, real a, real b) { return m.v ? a.v : b.v; }
 
 // x86 min/max return the second operand unless the first is strictly less/greater: with the operands swapped that is
 // the language's rule, ties and signed zeros included.
+// The maskz forms with every lane on are the plain ones without GCC 12's false warning about an undefined operand.
 #if KILN_LANES == 16
-KILN_SDF real min(real a, real b) { return lane_f(_mm512_min_ps(__m512(b.v), __m512(a.v))); }
-KILN_SDF real max(real a, real b) { return lane_f(_mm512_max_ps(__m512(b.v), __m512(a.v))); }
-KILN_SDF real sqrt(real a) { return lane_f(_mm512_sqrt_ps(__m512(a.v))); }
-KILN_SDF real floor(real a) { return lane_f(_mm512_roundscale_ps(__m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC)); }
-KILN_SDF whole whole_of(real a) { return lane_u(_mm512_cvttps_epi32(__m512(a.v))); }
+KILN_SDF real min(real a, real b) { return lane_f(_mm512_maskz_min_ps(0xffff, __m512(b.v), __m512(a.v))); }
+KILN_SDF real max(real a, real b) { return lane_f(_mm512_maskz_max_ps(0xffff, __m512(b.v), __m512(a.v))); }
+KILN_SDF real sqrt(real a) { return lane_f(_mm512_maskz_sqrt_ps(0xffff, __m512(a.v))); }
+KILN_SDF real floor(real a) { return lane_f(_mm512_maskz_roundscale_ps(0xffff, __m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC)); }
+KILN_SDF whole whole_of(real a) { return lane_u(_mm512_maskz_cvttps_epi32(0xffff, __m512(a.v))); }
 #elif KILN_LANES == 8
 KILN_SDF real min(real a, real b) { return lane_f(_mm256_min_ps(__m256(b.v), __m256(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm256_max_ps(__m256(b.v), __m256(a.v))); }

@@ -1,0 +1,434 @@
+// SPDX-License-Identifier: MIT
+// The tape compiler. Each edit's tree is expanded into binary nodes on an explicit stack (depth is limited by memory only):
+// transforms run together into one affine map, scales and Lipschitz factors sink into the leaves' multipliers, repeats
+// become unions of their nearest copies. Then registers are dealt out and the code is written.
+
+#include "sdf/bounds.h"
+#include "sdf/program.h"
+#include "sdf/resolve.h"
+#include "sdf/tables.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+namespace kiln::sdf {
+namespace {
+
+constexpr uint32_t kNone = UINT32_MAX;
+
+// q = M · (p − t), in double until it is written to the tape.
+struct AffineMap {
+    std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
+    std::array<double, 3> t{};
+
+    bool linear_identity() const { return m == std::array<double, 9>{1, 0, 0, 0, 1, 0, 0, 0, 1}; }
+    bool identity() const { return linear_identity() && t == std::array<double, 3>{}; }
+};
+
+// From a node's parent space into its own: M = scale⁻¹ · rotation⁻¹, t = position.
+AffineMap into_node(const Transform& transform) {
+    AffineMap out;
+    out.t = {transform.position.x, transform.position.y, transform.position.z};
+    const quat& q = transform.rotation;
+    const double x = q.x, y = q.y, z = q.z, w = q.w;
+    const double n = x * x + y * y + z * z + w * w;  // exact unit length is not a float's to give
+    const double s = n > 0 ? 2.0 / n : 0.0;
+    const std::array<double, 9> rotation{1 - s * (y * y + z * z), s * (x * y - z * w),     s * (x * z + y * w),
+                                         s * (x * y + z * w),     1 - s * (x * x + z * z), s * (y * z - x * w),
+                                         s * (x * z - y * w),     s * (y * z + x * w),     1 - s * (x * x + y * y)};
+    const double scale[3] = {transform.scale.x, transform.scale.y, transform.scale.z};
+    for (size_t i = 0; i < 3; ++i) {
+        for (size_t j = 0; j < 3; ++j) out.m[3 * i + j] = rotation[3 * j + i] / scale[i];
+    }
+    return out;
+}
+
+// First a, then b: M_b (M_a (p − t_a) − t_b) = M_b M_a (p − t_a − M_a⁻¹ t_b). M_a⁻¹ is solved for t_b by Cramer's rule.
+AffineMap then(const AffineMap& a, const AffineMap& b) {
+    AffineMap out;
+    for (size_t i = 0; i < 3; ++i) {
+        for (size_t j = 0; j < 3; ++j) {
+            out.m[3 * i + j] = b.m[3 * i] * a.m[j] + b.m[3 * i + 1] * a.m[3 + j] + b.m[3 * i + 2] * a.m[6 + j];
+        }
+    }
+    const auto det = [](const std::array<double, 9>& m) {
+        return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+    };
+    const double d = det(a.m);
+    for (size_t column = 0; column < 3; ++column) {
+        std::array<double, 9> replaced = a.m;
+        for (size_t row = 0; row < 3; ++row) replaced[3 * row + column] = b.t[row];
+        out.t[column] = a.t[column] + det(replaced) / d;
+    }
+    return out;
+}
+
+// One step of a point's way from the cell to a leaf; the way shares its beginning with others'.
+struct ChainStep {
+    uint32_t before;  // kNone: starts at the cell's point
+    Opcode opcode;
+    uint32_t aux;
+    uint32_t param;
+};
+
+struct Binary {
+    enum class Kind : uint8_t { Leaf, Value, Bound, Combine };
+    Kind kind = Kind::Leaf;
+    bool lacks_material = false;  // some leaf under it carries none
+    uint8_t need = 1;             // registers
+    uint32_t aux = 0;
+    uint32_t chain = kNone;
+    uint32_t param = 0;
+    uint32_t left = kNone, right = kNone;
+};
+
+// A node still to be expanded into binary node `parent`'s left or right.
+struct Task {
+    const Node* node;
+    const NodeBounds* bounds;
+    uint32_t object;      // whose nodes the node's children are
+    size_t entries;       // domain entries still to pass, last first
+    bool entered;         // transform and material already applied
+    AffineMap pending;    // since the chain's last step
+    uint32_t chain;
+    double scale;         // local metres to world metres, divided by the Lipschitz factors so far
+    uint32_t material;
+    uint32_t parent;
+    bool right;
+};
+
+class Compiler {
+public:
+    Compiler(const Resolved& resolved, Program& out) : resolved_(resolved), out_(out) {}
+
+    Result<void> run() {
+        const std::span<const Edit> edits = resolved_.source.edits;
+        out_.samples = resolved_.samples;
+        out_.code.push_back(Instruction::make(Opcode::Empty, 0, 0, 0, 0, 0));
+        out_.params.push_back(0);
+        out_.edits.resize(edits.size());
+        for (uint32_t e = 0; e < edits.size(); ++e) {
+            EditSpan& span = out_.edits[e];
+            span.first = uint32_t(out_.code.size());
+            span.op = edits[e].op;
+            if (edits[e].hidden) continue;
+            edit_ = e;
+            const Edit& edit = edits[e];
+            const float k = edit.blend_radius;
+            const float k_material = edit.material_blend_radius < 0 ? k : edit.material_blend_radius;
+            expand(edit);
+            deal_registers();
+            if (nodes_[0].need >= kRegisters) return Error{"edit " + edit.name + ": needs too many registers", ErrorKind::Input};
+            emit(0, 1);
+            const uint32_t at = uint32_t(out_.params.size());
+            out_.params.insert(out_.params.end(), {k, k_material});
+            const uint32_t flag = nodes_[0].lacks_material ? kMayLackMaterial : 0u;
+            out_.code.push_back(Instruction::make(Opcode::Combine, uint32_t(edit.op) | flag, 0, 0, 1, at));
+            span.count = uint32_t(out_.code.size()) - span.first;
+            span.bounds = resolved_.edit_bounds[e].parent;
+            span.reach = std::max(k, k_material);
+            if (edit.op == Op::Union) {
+                if (span.bounds.finite()) {
+                    out_.bounds = box_union(out_.bounds, span.bounds.inflated(0.25f * k));
+                } else {
+                    out_.unbounded = true;
+                }
+            }
+        }
+        return {};
+    }
+
+private:
+    uint32_t add_params(std::initializer_list<float> head, std::span<const float> tail = {}) {
+        const uint32_t at = uint32_t(out_.params.size());
+        out_.params.insert(out_.params.end(), head);
+        out_.params.insert(out_.params.end(), tail.begin(), tail.end());
+        return at;
+    }
+
+    uint32_t add_step(uint32_t before, Opcode opcode, uint32_t aux, uint32_t param) {
+        steps_.push_back({before, opcode, aux, param});
+        return uint32_t(steps_.size() - 1);
+    }
+
+    // The chain with the pending affine map written out.
+    uint32_t flush(uint32_t chain, const AffineMap& map) {
+        if (map.identity()) return chain != kNone ? chain : add_step(kNone, Opcode::PointCell, 0, 0);
+        const auto f = [](double v) { return float(v); };
+        if (chain == kNone && map.linear_identity()) {
+            return add_step(kNone, Opcode::PointTranslate, 0, add_params({f(map.t[0]), f(map.t[1]), f(map.t[2])}));
+        }
+        const uint32_t at = add_params({f(map.t[0]), f(map.t[1]), f(map.t[2]), f(map.m[0]), f(map.m[1]), f(map.m[2]), f(map.m[3]),
+                                        f(map.m[4]), f(map.m[5]), f(map.m[6]), f(map.m[7]), f(map.m[8])});
+        return add_step(chain, chain == kNone ? Opcode::PointAffine : Opcode::PointAffineOn, 0, at);
+    }
+
+    uint32_t add_node(const Task& task, Binary node) {
+        const uint32_t index = uint32_t(nodes_.size());
+        nodes_.push_back(node);
+        if (task.parent != kNone) (task.right ? nodes_[task.parent].right : nodes_[task.parent].left) = index;
+        return index;
+    }
+
+    void expand(const Edit& edit) {
+        nodes_.clear();
+        steps_.clear();
+        tasks_.clear();
+        const bool shows_others = edit.op == Op::Subtract || edit.op == Op::Intersect;
+        const uint32_t material = shows_others ? kNoMaterial : kDefaultMaterial;
+        tasks_.push_back({&edit.node, &resolved_.edit_bounds[edit_], kNone, edit.node.domain.size(), false, {}, kNone, 1.0, material,
+                          kNone, false});
+        while (!tasks_.empty()) {
+            Task task = tasks_.back();
+            tasks_.pop_back();
+            if (!task.entered) {
+                task.entered = true;
+                const AffineMap map = into_node(task.node->transform);
+                task.pending = task.pending.identity() ? map : then(task.pending, map);
+                task.scale *= double(smallest_scale(task.node->transform));
+                if (task.node->material) task.material = material_number(task.node->material);
+            }
+            pass_entries(task);
+        }
+    }
+
+    // Walks the domain from its last entry to its first, then expands the content.
+    void pass_entries(Task task) {
+        while (task.entries > 0) {
+            const size_t i = --task.entries;
+            const Warp& warp = task.node->domain[i];
+            const Box3& solid = task.bounds->stages[i + 1];
+            const KindRow::How how = warp_rows()[warp.kind].how;
+            if (how == KindRow::Copies) {
+                expand_copies(task, warp, task.bounds->stages[i]);
+                return;
+            }
+            const EntryFactor factor = entry_factor(warp, solid);
+            if (factor.lipschitz > 1.0f && factor.bounded) {
+                const uint32_t chain = flush(task.chain, task.pending);
+                add_bound(task, chain, solid, factor.margin);
+                if (how == KindRow::Point) {
+                    const Box3 wide = solid.inflated(factor.margin);
+                    task.chain = add_step(chain, Opcode::PointClamp, 0,
+                                          add_params({wide.min.x, wide.min.y, wide.min.z, wide.max.x, wide.max.y, wide.max.z}));
+                    task.pending = {};
+                }
+            }
+            task.scale /= double(factor.lipschitz);
+            if (how == KindRow::Point) {
+                task.chain = add_step(flush(task.chain, task.pending), Opcode::PointWarp, warp.kind, add_params({}, warp.params));
+                task.pending = {};
+            } else {
+                Binary value;
+                value.kind = Binary::Kind::Value;
+                value.aux = warp.kind;
+                value.chain = flush(task.chain, task.pending);
+                value.param = add_params({float(task.scale), float(1.0 / task.scale)}, warp.params);
+                task.parent = add_node(task, value);
+                task.right = false;
+            }
+        }
+        expand_content(task);
+    }
+
+    // R = max(min(R, m), distance(p, box)): the bounded leaf of architecture §4.
+    void add_bound(Task& task, uint32_t chain, const Box3& box, float margin) {
+        Binary bound;
+        bound.kind = Binary::Kind::Bound;
+        bound.chain = chain;
+        bound.param = add_params({float(task.scale), float(double(margin) * task.scale), box.min.x, box.min.y, box.min.z, box.max.x,
+                                  box.max.y, box.max.z});
+        task.parent = add_node(task, bound);
+        task.right = false;
+    }
+
+    // A union of the two nearest copies an axis. A child that is not an exact distance is bounded by its box, so that where the
+    // second nearest copy changes sides both candidates are their boxes' distances, which are equal there.
+    void expand_copies(const Task& task, const Warp& warp, const Box3& child) {
+        int axes[3];
+        int count = 0;
+        float spacing = INFINITY;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (warp.params[size_t(axis)] > 0 && warp.params[size_t(axis) + 3] != 1) {
+                axes[count++] = axis;
+                spacing = std::min(spacing, warp.params[size_t(axis)]);
+            }
+        }
+        const auto middle = [](float lo, float hi) { return std::isfinite(lo) && std::isfinite(hi) ? 0.5f * (lo + hi) : 0.0f; };
+        const vec3 center{middle(child.min.x, child.max.x), middle(child.min.y, child.max.y), middle(child.min.z, child.max.z)};
+        const bool exact = task.entries == 0 && task.node->kind == Node::Kind::Shape &&
+                           shape_rows()[task.node->shape.kind].how == KindRow::Exact;
+        const uint32_t chain = flush(task.chain, task.pending);
+        const uint32_t copies = 1u << count;
+        Task holder = task;
+        for (uint32_t c = 0; c < copies; ++c) {
+            Task copy = task;
+            if (c + 1 < copies) {
+                Binary both;
+                both.kind = Binary::Kind::Combine;
+                both.aux = uint32_t(Op::Union);
+                both.param = add_params({0.0f, 0.0f});
+                holder.parent = add_node(holder, both);
+                holder.right = true;
+                copy.right = false;
+            } else {
+                copy.right = holder.right;
+            }
+            copy.parent = holder.parent;
+            float second[3] = {0, 0, 0};
+            for (int i = 0; i < count; ++i) second[axes[i]] = (c >> i & 1u) != 0 ? 1.0f : 0.0f;
+            copy.chain = add_step(chain, Opcode::PointCopy, warp.kind,
+                                  add_params({center.x, center.y, center.z, second[0], second[1], second[2]}, warp.params));
+            copy.pending = {};
+            if (!exact && count > 0) add_bound(copy, copy.chain, child, 0.5f * spacing);
+            tasks_.push_back(copy);
+        }
+    }
+
+    void expand_content(const Task& task) {
+        const Node& node = *task.node;
+        if (const uint32_t object = resolved_.object_of(node); object != kNone) {
+            const Object& inner = resolved_.object(object);
+            Task root = task;
+            root.node = &inner.nodes[0];
+            root.bounds = &resolved_.object_bounds[object][0];
+            root.object = object;
+            root.entries = root.node->domain.size();
+            root.entered = false;
+            tasks_.push_back(root);
+        } else if (node.kind == Node::Kind::Fold) {
+            expand_fold(task);
+        } else {
+            add_leaf(task);
+        }
+    }
+
+    // ((c0 op c1) op c2) …: the last operation is outermost.
+    void expand_fold(const Task& task) {
+        const Node& node = *task.node;
+        const float scale = float(task.scale);
+        const float k = node.blend_radius;
+        const float k_material = node.material_blend_radius < 0 ? k : node.material_blend_radius;
+        const bool shows_others = node.op == Op::Subtract || node.op == Op::Intersect;
+        const Object& object = resolved_.object(task.object);
+        const std::vector<NodeBounds>& bounds = resolved_.object_bounds[task.object];
+        Task holder = task;
+        for (size_t i = node.children.size(); i-- > 0;) {
+            Task child = task;
+            child.node = &object.nodes[node.children[i]];
+            child.bounds = &bounds[node.children[i]];
+            child.entries = child.node->domain.size();
+            child.entered = false;
+            if (i > 0) {
+                Binary both;
+                both.kind = Binary::Kind::Combine;
+                both.aux = uint32_t(node.op);
+                both.param = add_params({k * scale, k_material * scale});
+                holder.parent = add_node(holder, both);
+                holder.right = false;
+                child.right = true;
+                if (shows_others) child.material = kNoMaterial;
+            } else {
+                child.right = holder.right;
+            }
+            child.parent = holder.parent;
+            tasks_.push_back(child);
+        }
+    }
+
+    void add_leaf(const Task& task) {
+        const Shape& shape = task.node->shape;
+        const std::array<float, kMaxParams> params = resolved_.params_of(shape);
+        Binary leaf;
+        leaf.aux = shape.kind;
+        leaf.chain = flush(task.chain, task.pending);
+        leaf.param = add_params({float(task.scale), float(task.material), float(edit_)}, params);
+        leaf.lacks_material = task.material == kNoMaterial;
+        add_node(task, leaf);
+    }
+
+    // Children have higher indices than their parents, so one backward pass sees every child first.
+    void deal_registers() {
+        for (size_t i = nodes_.size(); i-- > 0;) {
+            Binary& n = nodes_[i];
+            if (n.kind == Binary::Kind::Leaf) continue;
+            const Binary& l = nodes_[n.left];
+            n.need = l.need;
+            n.lacks_material = l.lacks_material;
+            if (n.kind == Binary::Kind::Combine) {
+                const Binary& r = nodes_[n.right];
+                n.need = l.need == r.need ? uint8_t(l.need + 1) : std::max(l.need, r.need);
+                n.lacks_material = n.lacks_material || r.lacks_material;
+            }
+        }
+    }
+
+    void emit_chain(uint32_t chain) {
+        const size_t from = out_.code.size();
+        for (uint32_t s = chain; s != kNone; s = steps_[s].before) {
+            out_.code.push_back(Instruction::make(steps_[s].opcode, steps_[s].aux, 0, 0, 0, steps_[s].param));
+        }
+        std::reverse(out_.code.begin() + long(from), out_.code.end());
+    }
+
+    void emit(uint32_t root, uint32_t dst) {
+        struct Visit {
+            uint32_t node;
+            uint32_t dst;
+            int stage;
+        };
+        std::vector<Visit> stack{{root, dst, 0}};
+        while (!stack.empty()) {
+            const Visit v = stack.back();
+            stack.pop_back();
+            const Binary& n = nodes_[v.node];
+            if (n.kind == Binary::Kind::Leaf) {
+                emit_chain(n.chain);
+                out_.code.push_back(Instruction::make(Opcode::Shape, n.aux, v.dst, 0, 0, n.param));
+            } else if (n.kind != Binary::Kind::Combine) {
+                if (v.stage == 0) {
+                    stack.push_back({v.node, v.dst, 1});
+                    stack.push_back({n.left, v.dst, 0});
+                } else {
+                    emit_chain(n.chain);
+                    const Opcode op = n.kind == Binary::Kind::Value ? Opcode::Value : Opcode::Bound;
+                    out_.code.push_back(Instruction::make(op, n.aux, v.dst, 0, 0, n.param));
+                }
+            } else {
+                const bool left_first = nodes_[n.left].need >= nodes_[n.right].need;
+                if (v.stage == 0) {
+                    stack.push_back({v.node, v.dst, 1});
+                    stack.push_back({n.right, left_first ? v.dst + 1 : v.dst, 0});
+                    stack.push_back({n.left, left_first ? v.dst : v.dst + 1, 0});
+                    if (!left_first) std::swap(stack[stack.size() - 1], stack[stack.size() - 2]);
+                } else {
+                    const uint32_t a = left_first ? v.dst : v.dst + 1;
+                    const uint32_t b = left_first ? v.dst + 1 : v.dst;
+                    const uint32_t flag = nodes_[n.right].lacks_material ? kMayLackMaterial : 0u;
+                    out_.code.push_back(Instruction::make(Opcode::Combine, n.aux | flag, v.dst, a, b, n.param));
+                }
+            }
+        }
+    }
+
+    const Resolved& resolved_;
+    Program& out_;
+    uint32_t edit_ = 0;
+    std::vector<Binary> nodes_;
+    std::vector<ChainStep> steps_;
+    std::vector<Task> tasks_;
+};
+
+}  // namespace
+
+Result<Program> compile(const Source& source, Fault* fault) {
+    auto resolved = resolve(source, fault);
+    if (!resolved) return resolved.error();
+    Program out;
+    if (auto r = Compiler(*resolved, out).run(); !r) return r.error();
+    return out;
+}
+
+}  // namespace kiln::sdf

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+// Chooses the instruction set at run time, and runs the tape in double precision for single exact answers.
+
+#include "sdf/eval.h"
+
+#include "sdf/eval_isa.h"
+
+#include <algorithm>
+#include <cstdlib>
+#include <string_view>
+
+namespace kiln::sdf {
+
+namespace exact {
+#define KILN_SCALAR double
+#define KILN_VECTORS 1
+#include "sdf/lang/scalar.h"
+#include "sdf/lang/trig_exact.h"
+#include "sdf/lang/material.sdf.h"
+
+#include "sdf/texts.gen.inl"
+
+#include "sdf/eval_lanes.inl"
+}  // namespace exact
+
+namespace {
+
+const uint32_t* words(std::span<const Instruction> code) { return reinterpret_cast<const uint32_t*>(code.data()); }
+
+bool processor_has(Isa isa) {
+    switch (isa) {
+        case Isa::Scalar: return true;
+        case Isa::Sse4: return __builtin_cpu_supports("sse4.1") != 0;
+        case Isa::Avx2: return __builtin_cpu_supports("avx2") != 0;
+        case Isa::Avx512:
+            return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+                   __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
+    }
+    return false;
+}
+
+Isa choose() {
+    const char* wanted = std::getenv("KILN_ISA");
+    const std::string_view name = wanted != nullptr ? wanted : "";
+    if (name == "scalar") return Isa::Scalar;
+    if (name == "sse4" && processor_has(Isa::Sse4)) return Isa::Sse4;
+    if (name == "avx2" && processor_has(Isa::Avx2)) return Isa::Avx2;
+    for (Isa isa : {Isa::Avx512, Isa::Avx2, Isa::Sse4}) {
+        if (processor_has(isa)) return isa;
+    }
+    return Isa::Scalar;
+}
+
+}  // namespace
+
+bool has_isa(Isa isa) { return processor_has(isa); }
+
+Isa best_isa() {
+    static const Isa chosen = choose();
+    return chosen;
+}
+
+void evaluate(const TapeView& tape, const Points& points, float* out, Isa isa) {
+    const auto run = isa == Isa::Avx512 ? &avx512::evaluate_points
+                     : isa == Isa::Avx2 ? &avx2::evaluate_points
+                     : isa == Isa::Sse4 ? &sse4::evaluate_points
+                                        : &scalar::evaluate_points;
+    run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x, points.y, points.z, points.count, out);
+}
+
+void evaluate_materials(const TapeView& tape, const Points& points, float* out, MaterialMix* mix, bool edits, Isa isa) {
+    const auto run = isa == Isa::Avx512 ? &avx512::evaluate_mixes
+                     : isa == Isa::Avx2 ? &avx2::evaluate_mixes
+                     : isa == Isa::Sse4 ? &sse4::evaluate_mixes
+                                        : &scalar::evaluate_mixes;
+    constexpr int kBatch = 512;
+    float id0[kBatch], id1[kBatch], share[kBatch];
+    for (int at = 0; at < points.count; at += kBatch) {
+        const int n = std::min(kBatch, points.count - at);
+        run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x + at, points.y + at, points.z + at, n, out + at,
+            id0, id1, share, edits ? 2 : 1);
+        for (int i = 0; i < n; ++i) mix[at + i] = {uint16_t(id0[i]), uint16_t(id1[i]), share[i]};
+    }
+}
+
+double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix, bool edits) {
+    exact::Registers r;
+    r.cell[0].v[0] = p_world.x;
+    r.cell[1].v[0] = p_world.y;
+    r.cell[2].v[0] = p_world.z;
+    const exact::Samples samples{tape.samples};
+    if (mix == nullptr) {
+        exact::run_distance(r, words(tape.code), tape.code.size(), tape.params, samples);
+    } else {
+        exact::MixChunk chunks[kRegisters];
+        exact::run_materials(r, chunks, words(tape.code), tape.code.size(), tape.params, samples, edits ? 2 : 1);
+        const exact::Mix& m = chunks[0].v[0];
+        *mix = {uint16_t(m.id0), uint16_t(m.id1), float(m.share)};
+    }
+    return r.value[0].v[0];
+}
+
+}  // namespace kiln::sdf

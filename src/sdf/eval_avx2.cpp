@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// The tape interpreter for AVX2: 8 lanes.
+
+#include "sdf/eval_isa.h"
+
+#include <immintrin.h>
+
+#define KILN_LANES 8
+#define KILN_VECTORS (64 / KILN_LANES)
+
+namespace kiln::sdf::avx2 {
+#include "sdf/lang/simd.h"
+#define KILN_T param
+#include "sdf/lang/trig.sdf.h"
+#undef KILN_T
+#define KILN_T real
+#include "sdf/lang/trig.sdf.h"
+#undef KILN_T
+#include "sdf/lang/material.sdf.h"
+
+#include "sdf/texts.gen.inl"
+
+static inline real load(const float* from) {
+    lane_f v;
+    __builtin_memcpy(&v, from, sizeof v);
+    return v;
+}
+static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof v.v); }
+
+#include "sdf/eval_lanes.inl"
+#include "sdf/eval_entry.inl"
+}  // namespace kiln::sdf::avx2

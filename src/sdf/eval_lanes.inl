@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// The tape interpreter for one lane type. Included once per instruction set, inside its own namespace, after the shape language and
+// the generated texts. Works instruction by instruction on a chunk of points, so that decoding costs nothing.
+// Uses no standard-library templates: what a wide instruction set compiles here must not be shared with other files.
+// KILN_VECTORS: vectors in a chunk. load(), store() and real are the including file's.
+
+struct Chunk {
+    real v[KILN_VECTORS];
+};
+
+struct MixChunk {
+    Mix v[KILN_VECTORS];
+};
+
+struct Registers {
+    Chunk cell[3];             // C
+    Chunk point[3];            // P
+    Chunk value[kRegisters];
+};
+
+static inline real3 point_at(const Chunk* p, int i) { return real3(p[0].v[i], p[1].v[i], p[2].v[i]); }
+static inline void set_point(Chunk* p, int i, real3 q) {
+    p[0].v[i] = q.x;
+    p[1].v[i] = q.y;
+    p[2].v[i] = q.z;
+}
+static inline param3 param3_at(const float* w) { return param3(param(w[0]), param(w[1]), param(w[2])); }
+
+// Row-major 3x3 matrix times (p - t); w = t[3] M[9].
+static inline real3 affine(real3 p, const float* w) {
+    const real3 q = p - param3_at(w);
+    return real3(param(w[3]) * q.x + param(w[4]) * q.y + param(w[5]) * q.z,
+                 param(w[6]) * q.x + param(w[7]) * q.y + param(w[8]) * q.z,
+                 param(w[9]) * q.x + param(w[10]) * q.y + param(w[11]) * q.z);
+}
+
+// Distance of p from the box, 0 inside.
+static inline real box_gap(real3 p, param3 lo, param3 hi) {
+    const real3 q = max(max(lo - p, p - hi), real3(real(0.0f), real(0.0f), real(0.0f)));
+    return length(q);
+}
+
+// One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
+static __attribute__((noinline)) void step(Registers& r, uint32_t word, const float* w, Samples samples) {
+    const uint32_t aux = (word >> 4) & 255u;
+    Chunk& dst = r.value[(word >> 12) & 31u];
+    switch (Opcode(word & 15u)) {
+        case Opcode::PointCell:
+            for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, point_at(r.cell, i));
+            break;
+        case Opcode::PointTranslate:
+            for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, point_at(r.cell, i) - param3_at(w));
+            break;
+        case Opcode::PointAffine:
+            for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, affine(point_at(r.cell, i), w));
+            break;
+        case Opcode::PointAffineOn:
+            for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, affine(point_at(r.point, i), w));
+            break;
+        case Opcode::PointWarp:
+            for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, point_warp(aux, point_at(r.point, i), w));
+            break;
+        case Opcode::PointCopy:
+            for (int i = 0; i < KILN_VECTORS; ++i)
+                set_point(r.point, i, copy_warp(aux, point_at(r.point, i), w + 6, param3_at(w), param3_at(w + 3)));
+            break;
+        case Opcode::PointClamp:
+            for (int i = 0; i < KILN_VECTORS; ++i)
+                set_point(r.point, i, clamp(point_at(r.point, i), param3_at(w), param3_at(w + 3)));
+            break;
+        case Opcode::Shape:
+            for (int i = 0; i < KILN_VECTORS; ++i)
+                dst.v[i] = shape_distance(aux, point_at(r.point, i), w + 3, samples) * param(w[0]);
+            break;
+        case Opcode::Value:
+            for (int i = 0; i < KILN_VECTORS; ++i)
+                dst.v[i] = value_warp(aux, dst.v[i] * param(w[1]), point_at(r.point, i), w + 2) * param(w[0]);
+            break;
+        case Opcode::Bound:
+            for (int i = 0; i < KILN_VECTORS; ++i) {
+                const real gap = box_gap(point_at(r.point, i), param3_at(w + 2), param3_at(w + 5)) * param(w[0]);
+                dst.v[i] = max(min(dst.v[i], real(param(w[1]))), gap);
+            }
+            break;
+        default: __builtin_unreachable();
+    }
+}
+
+static void run_distance(Registers& r, const uint32_t* code, size_t count, const float* params, Samples samples) {
+    for (size_t pc = 0; pc < count; ++pc) {
+        const uint32_t word = code[2 * pc];
+        const float* w = params + code[2 * pc + 1];
+        Chunk& dst = r.value[(word >> 12) & 31u];
+        const Chunk& a = r.value[(word >> 17) & 31u];
+        const Chunk& b = r.value[(word >> 22) & 31u];
+        const uint32_t aux = (word >> 4) & 255u;
+        switch (Opcode(word & 15u)) {
+            case Opcode::Combine: {
+                const param k = param(w[0]);
+                switch (aux & 3u) {
+                    case 0:
+                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(0, a.v[i], b.v[i], k);
+                        break;
+                    case 1:
+                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(1, a.v[i], b.v[i], k);
+                        break;
+                    case 2:
+                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(2, a.v[i], b.v[i], k);
+                        break;
+                    default:
+                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = a.v[i];
+                        break;
+                }
+                break;
+            }
+            case Opcode::Move:
+                for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = a.v[i];
+                break;
+            case Opcode::Negate:
+                for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = -a.v[i];
+                break;
+            case Opcode::Empty:
+                for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = real(param(kEmpty));
+                break;
+            case Opcode::Take:
+                for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = aux == 1u ? -b.v[i] : b.v[i];
+                break;
+            case Opcode::Constant:
+                for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = real(param(0));
+                break;
+            default: step(r, word, w, samples); break;
+        }
+    }
+}
+
+// slot 1: materials, slot 2: edits (words of a Shape's parameters).
+[[maybe_unused]] static void run_materials(Registers& r, MixChunk* mix, const uint32_t* code, size_t count, const float* params, Samples samples,
+                          int slot) {
+    const real none = real(param(kNoMaterial));
+    const real zero = real(param(0));
+    for (size_t pc = 0; pc < count; ++pc) {
+        const uint32_t word = code[2 * pc];
+        const float* w = params + code[2 * pc + 1];
+        const uint32_t d = (word >> 12) & 31u;
+        Chunk& dst = r.value[d];
+        const Chunk& a = r.value[(word >> 17) & 31u];
+        const Chunk& b = r.value[(word >> 22) & 31u];
+        const MixChunk& mix_a = mix[(word >> 17) & 31u];
+        const MixChunk& mix_b = mix[(word >> 22) & 31u];
+        const uint32_t aux = (word >> 4) & 255u;
+        switch (Opcode(word & 15u)) {
+            case Opcode::Combine:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    const uint32_t op = aux & 3u;
+                    const bool paint = op == 3u;
+                    const real t = paint ? share_min(zero, b.v[i], param(w[1])) : op_share(op, a.v[i], b.v[i], param(w[1]));
+                    mix[d].v[i] = blend_mix(mix_a.v[i], mix_b.v[i], t);
+                    dst.v[i] = paint ? a.v[i] : op_distance(op, a.v[i], b.v[i], param(w[0]));
+                }
+                break;
+            case Opcode::Move:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    dst.v[i] = a.v[i];
+                    mix[d].v[i] = mix_a.v[i];
+                }
+                break;
+            case Opcode::Negate:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    dst.v[i] = -a.v[i];
+                    mix[d].v[i] = mix_a.v[i];
+                }
+                break;
+            case Opcode::Empty:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    dst.v[i] = real(param(kEmpty));
+                    mix[d].v[i] = make_mix(none, none, zero);
+                }
+                break;
+            case Opcode::Take:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    dst.v[i] = aux == 1u ? -b.v[i] : b.v[i];
+                    mix[d].v[i] = select_mix(same(mix_b.v[i].id0, none), mix_a.v[i], mix_b.v[i]);
+                }
+                break;
+            case Opcode::Constant:
+                for (int i = 0; i < KILN_VECTORS; ++i) {
+                    dst.v[i] = zero;
+                    mix[d].v[i] = make_mix(real(param(w[slot])), none, zero);
+                }
+                break;
+            case Opcode::Shape:
+                step(r, word, w, samples);
+                for (int i = 0; i < KILN_VECTORS; ++i) mix[d].v[i] = make_mix(real(param(w[slot])), none, zero);
+                break;
+            default: step(r, word, w, samples); break;
+        }
+    }
+}

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: MIT
+// References are followed depth first with a stack of its own; bounds go from the leaves up.
+
+#include "sdf/resolve.h"
+
+#include "sdf/bounds.h"
+#include "sdf/library/library.h"
+#include "sdf/tables.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <limits>
+
+namespace kiln::sdf {
+namespace {
+
+bool is_copies(const Warp& warp) { return warp_rows()[warp.kind].how == KindRow::Copies; }
+
+Error fail(Fault* fault, const Fault& where, std::string message) {
+    if (fault != nullptr) *fault = where;
+    return Error{std::move(message), ErrorKind::Input};
+}
+
+Box3 fold_bounds(const Node& node, const std::vector<NodeBounds>& nodes) {
+    Box3 box = nodes[node.children[0]].parent;
+    for (size_t i = 1; i < node.children.size(); ++i) {
+        const Box3& next = nodes[node.children[i]].parent;
+        if (node.op == Op::Union) {
+            box = box_union(box, next);
+        } else if (node.op == Op::Intersect) {
+            // Disjoint boxes: the solid is empty, but later entries still need some finite box to be proven on.
+            const Box3 shared = box_intersection(box, next);
+            if (!shared.empty()) box = shared;
+        }
+    }
+    // smooth_min lies at most k/4 below min: a smooth union can bulge that far.
+    if (node.op == Op::Union && node.children.size() > 1) box = box.inflated(0.25f * node.blend_radius);
+    return box;
+}
+
+// A repeat needs its child's bounds to fit one spacing on every axis that it repeats.
+const char* repeat_fault(const Warp& warp, const Box3& child) {
+    const float size[3] = {child.max.x - child.min.x, child.max.y - child.min.y, child.max.z - child.min.z};
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const float spacing = warp.params[axis];
+        if (spacing <= 0 || warp.params[3 + axis] == 1) continue;
+        if (!(size[axis] <= spacing * 1.0001f)) return "the repeated shape is wider than the spacing; use a larger spacing or a smaller shape";
+    }
+    return nullptr;
+}
+
+int repeat_axes(const Warp& warp) {
+    int n = 0;
+    for (size_t axis = 0; axis < 3; ++axis) n += warp.params[axis] > 0 && warp.params[3 + axis] != 1;
+    return n;
+}
+
+// Largest difference between neighbours along x and along z.
+vec2 steepest_steps(const HeightGrid& grid) {
+    vec2 step;
+    for (int z = 0; z < grid.rows; ++z) {
+        for (int x = 0; x < grid.columns; ++x) {
+            const float v = grid.values[size_t(z * grid.columns + x)];
+            if (x > 0) step.x = std::max(step.x, std::fabs(v - grid.values[size_t(z * grid.columns + x - 1)]));
+            if (z > 0) step.y = std::max(step.y, std::fabs(v - grid.values[size_t((z - 1) * grid.columns + x)]));
+        }
+    }
+    return step;
+}
+
+class Resolver {
+public:
+    Resolver(Resolved& out, Fault* fault) : out_(out), fault_(fault) {}
+
+    Result<void> run() {
+        const Source& s = out_.source;
+        for (const HeightGrid& grid : s.grids) {
+            out_.grid_first.push_back(uint32_t(out_.samples.size()));
+            out_.samples.insert(out_.samples.end(), grid.values.begin(), grid.values.end());
+            out_.grid_steps.push_back(steepest_steps(grid));
+        }
+        collect_composites();
+        const size_t objects = s.objects.size() + out_.composites.size();
+        state_.assign(objects, Unseen);
+        out_.object_bounds.resize(objects);
+        out_.edit_bounds.resize(s.edits.size());
+        uint64_t leaves = 0;
+        for (uint32_t e = 0; e < s.edits.size(); ++e) {
+            if (s.edits[e].hidden) continue;
+            where_ = {};
+            where_.edit = e;
+            const Node& node = s.edits[e].node;
+            if (node.kind == Node::Kind::Fold) return fail(fault_, where_, "an edit has no children of its own; name an object");
+            if (auto r = visit_object_of(node); !r) return r;
+            where_.object = UINT32_MAX;
+            where_.node = 0;
+            if (auto r = bound_node(node, nullptr, out_.edit_bounds[e]); !r) return r;
+            leaves += out_.edit_bounds[e].leaves;
+            if (leaves > kMaxLeaves) {
+                return fail(fault_, where_, "the edits up to here expand to more than 4194304 primitives; use fewer copies");
+            }
+        }
+        return {};
+    }
+
+private:
+    enum State : uint8_t { Unseen, Open, Done };
+
+    // Every composite shape in reach becomes one object per distinct parameter set.
+    void collect_composites() {
+        const auto add = [&](const Node& node) {
+            if (node.kind != Node::Kind::Shape || node.shape.kind < primitive_count()) return;
+            const auto key = std::pair(node.shape.kind, node.shape.params);
+            const auto index = uint32_t(out_.source.objects.size() + out_.composites.size());
+            if (out_.composite_index.emplace(key, index).second) {
+                out_.composites.push_back(composite_object(node.shape.kind, node.shape.params));
+            }
+        };
+        for (const Object& o : out_.source.objects) std::for_each(o.nodes.begin(), o.nodes.end(), add);
+        for (const Edit& e : out_.source.edits) {
+            if (!e.hidden) add(e.node);
+        }
+        for (size_t i = 0; i < out_.composites.size(); ++i) {
+            const std::vector<Node> nodes = out_.composites[i].nodes;  // a copy: adding may move the vector
+            std::for_each(nodes.begin(), nodes.end(), add);
+        }
+    }
+
+    // Depth-first over references, with a stack of its own: chains of references may be as long as memory allows.
+    Result<void> visit_object_of(const Node& node) {
+        if (node.kind == Node::Kind::Fold) return {};
+        if (node.kind == Node::Kind::Shape && node.shape.kind < primitive_count()) return {};
+        struct Level {
+            uint32_t object;
+            uint32_t next_node;
+        };
+        std::vector<Level> stack;
+        const auto enter = [&](uint32_t object) -> Result<void> {
+            const size_t count = out_.source.objects.size() + out_.composites.size();
+            if (object >= count || out_.object(object).nodes.empty()) {
+                return fail(fault_, where_, "refers to an object that does not exist");
+            }
+            if (state_[object] == State::Open) return fail(fault_, where_, "object contains itself: " + cycle(stack, object));
+            if (state_[object] == State::Unseen) {
+                state_[object] = State::Open;
+                stack.push_back({object, 0});
+            }
+            return {};
+        };
+        if (auto r = enter(out_.object_of(node)); !r) return r;
+        while (!stack.empty()) {
+            const uint32_t index = stack.back().object;
+            const Object& object = out_.object(index);
+            bool descended = false;
+            while (stack.back().next_node < object.nodes.size()) {
+                const uint32_t n = stack.back().next_node++;
+                const uint32_t inner = out_.object_of(object.nodes[n]);
+                if (inner == UINT32_MAX && object.nodes[n].kind != Node::Kind::Object) continue;
+                where_.object = index;
+                where_.node = n;
+                const size_t depth = stack.size();
+                if (auto r = enter(inner); !r) return r;
+                if (stack.size() > depth) {
+                    descended = true;
+                    break;
+                }
+            }
+            if (descended) continue;
+            if (auto r = bound_object(index); !r) return r;
+            state_[index] = State::Done;
+            stack.pop_back();
+        }
+        return {};
+    }
+
+    template <typename Stack>
+    std::string cycle(const Stack& stack, uint32_t object) const {
+        std::string text;
+        bool inside = false;
+        for (const auto& open : stack) {
+            inside = inside || open.object == object;
+            if (inside) text += out_.object(open.object).name + " -> ";
+            if (text.size() > 300) return text + "… -> " + out_.object(object).name;
+        }
+        return text + out_.object(object).name;
+    }
+
+    Result<void> bound_object(uint32_t index) {
+        const Object& object = out_.object(index);
+        std::vector<NodeBounds>& bounds = out_.object_bounds[index];
+        bounds.resize(object.nodes.size());
+        where_.object = index;
+        for (uint32_t n = uint32_t(object.nodes.size()); n-- > 0;) {
+            where_.node = n;
+            for (uint32_t child : object.nodes[n].children) {
+                if (child <= n || child >= object.nodes.size()) return fail(fault_, where_, "a child must come after its parent");
+            }
+            if (auto r = bound_node(object.nodes[n], &bounds, bounds[n]); !r) return r;
+        }
+        return {};
+    }
+
+    // Shape::data is the index of a grid with at least 2 x 2 values.
+    bool has_grid(const Shape& shape) const {
+        size_t index = 0;
+        const auto end = shape.data.data() + shape.data.size();
+        const auto [rest, error] = std::from_chars(shape.data.data(), end, index);
+        if (error != std::errc{} || rest != end || index >= out_.source.grids.size()) return false;
+        const HeightGrid& grid = out_.source.grids[index];
+        return grid.columns >= 2 && grid.rows >= 2 && grid.values.size() == size_t(grid.columns) * size_t(grid.rows);
+    }
+
+    Result<void> bound_node(const Node& node, const std::vector<NodeBounds>* nodes, NodeBounds& out) {
+        where_.warp = -1;
+        Box3 box;
+        uint64_t leaves = 1;
+        if (node.kind == Node::Kind::Fold) {
+            if (node.children.empty()) return fail(fault_, where_, "a node with `op` needs at least one child");
+            if (node.op == Op::Paint) return fail(fault_, where_, "paint is not an operation of trees; use union, subtract or intersect");
+            box = fold_bounds(node, *nodes);
+            leaves = 0;
+            for (uint32_t child : node.children) leaves += (*nodes)[child].leaves;
+        } else if (const uint32_t object = out_.object_of(node); object != UINT32_MAX) {
+            box = out_.object_bounds[object][0].parent;
+            leaves = out_.object_bounds[object][0].leaves;
+        } else {
+            if (shape_rows()[node.shape.kind].how == KindRow::Sampled && !has_grid(node.shape)) {
+                return fail(fault_, where_, "refers to a file that was not loaded");
+            }
+            box = shape_bounds(node.shape);
+        }
+        out.stages.clear();
+        out.stages.push_back(box);
+        for (size_t i = 0; i < node.domain.size(); ++i) {
+            const Warp& warp = node.domain[i];
+            where_.warp = int(i);
+            if (is_copies(warp)) {
+                if (const char* why = repeat_fault(warp, box)) return fail(fault_, where_, why);
+                leaves <<= repeat_axes(warp);
+            }
+            box = warp_bounds(warp, box);
+            if (std::isinf(entry_factor(warp, box).lipschitz)) {
+                return fail(fault_, where_,
+                            box.finite() ? "bends this shape further than it can go; use a smaller value"
+                                         : "needs a shape of finite size; use it on a bounded shape");
+            }
+            out.stages.push_back(box);
+            leaves = std::min(leaves, uint64_t(1) << 40);
+        }
+        where_.warp = -1;
+        if (leaves > kMaxLeaves) return fail(fault_, where_, "expands to more than 4194304 primitives; use fewer copies");
+        out.leaves = leaves;
+        out.parent = transformed_box(box, node.transform);
+        return {};
+    }
+
+    Resolved& out_;
+    Fault* fault_;
+    Fault where_;
+    std::vector<State> state_;
+};
+
+}  // namespace
+
+uint32_t Resolved::object_of(const Node& node) const {
+    if (node.kind == Node::Kind::Object) return node.object.index;
+    if (node.kind == Node::Kind::Shape && node.shape.kind >= primitive_count()) {
+        return composite_index.at({node.shape.kind, node.shape.params});
+    }
+    return UINT32_MAX;
+}
+
+std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
+    std::array<float, kMaxParams> params = shape.params;
+    if (shape_rows()[shape.kind].how != KindRow::Sampled) return params;
+    size_t index = 0;  // checked by the resolver
+    std::from_chars(shape.data.data(), shape.data.data() + shape.data.size(), index);
+    const HeightGrid& grid = source.grids[index];
+    for (const FieldRow& field : shape_rows()[shape.kind].fields()) {
+        if (field.range != "internal") continue;
+        const size_t at = size_t(field.offset);
+        if (field.name == "first") params[at] = float(grid_first[index]);
+        if (field.name == "columns") params[at] = float(grid.columns);
+        if (field.name == "rows") params[at] = float(grid.rows);
+        if (field.name == "step_x") params[at] = grid_steps[index].x;
+        if (field.name == "step_z") params[at] = grid_steps[index].y;
+    }
+    return params;
+}
+
+EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {
+    EntryFactor out;
+    out.bounded = solid_after.finite();
+    out.lipschitz = warp_lipschitz(warp, solid_after);
+    if (!out.bounded || out.lipschitz == 1.0f) return out;
+    // The wider the margin, the farther the value stays close to the true distance, but the larger the factor.
+    const vec3 half = solid_after.half_extents();
+    const float size = std::max({half.x, half.y, half.z});
+    for (float share : {0.25f, 0.125f, 0.0625f, 0.03125f}) {
+        out.margin = share * size;
+        const float l = warp_lipschitz(warp, solid_after.inflated(out.margin));
+        if (std::isfinite(l) && l <= 2.0f * out.lipschitz) {
+            out.lipschitz = l;
+            return out;
+        }
+    }
+    out.lipschitz = std::numeric_limits<float>::infinity();
+    return out;
+}
+
+Result<Resolved> resolve(const Source& source, Fault* fault) {
+    Resolved out;
+    out.source = source;
+    if (auto r = Resolver(out, fault).run(); !r) return r.error();
+    return out;
+}
+
+}  // namespace kiln::sdf

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: MIT
+// Resolved source: every reference followed once, cycles refused, composites expanded to objects, bounds of every node known.
+// What the tape compiler and the judge both start from; it decides nothing about distances.
+#pragma once
+
+#include "sdf/program.h"
+
+#include <map>
+#include <vector>
+
+namespace kiln::sdf {
+
+/// Bounds of one node: solid of its bare content, then after each domain entry, then in its parent's space.
+struct NodeBounds {
+    std::vector<Box3> stages;  ///< [0] content, [i + 1] after domain[i]
+    Box3 parent;
+    uint64_t leaves = 1;       ///< primitives it expands to, copies counted
+};
+
+/// Most primitives one world may expand to: what 22 value registers can serve (Sethi–Ullman: log2 + 1).
+inline constexpr uint64_t kMaxLeaves = uint64_t(1) << 22;
+
+struct Resolved {
+    Source source;
+    std::vector<Object> composites;                     ///< objects of composite shapes, numbered after source.objects
+    std::vector<std::vector<NodeBounds>> object_bounds; ///< by object, by node
+    std::vector<NodeBounds> edit_bounds;                ///< by edit; empty stages for hidden edits
+
+    std::vector<float> samples;                         ///< all grids, one after another
+    std::vector<uint32_t> grid_first;                   ///< where each grid begins in `samples`
+    std::vector<vec2> grid_steps;                       ///< its largest difference between neighbours, along x and along z
+
+    /// A shape's numbers with the internal fields of sampled shapes filled in.
+    std::array<float, kMaxParams> params_of(const Shape& shape) const;
+
+    const Object& object(uint32_t index) const {
+        return index < source.objects.size() ? source.objects[index] : composites[index - source.objects.size()];
+    }
+    /// The object a node stands for: a reference or a composite shape; UINT32_MAX for primitives and folds.
+    uint32_t object_of(const Node& node) const;
+    std::map<std::pair<uint16_t, std::array<float, kMaxParams>>, uint32_t> composite_index;
+};
+
+/// Follows everything the visible edits reach. Faults as compile().
+Result<Resolved> resolve(const Source& source, Fault* fault);
+
+/// The margin m and factor L of a Lipschitz-bounded entry: its divided child is proven on the solid's box inflated by m
+/// (architecture: bounded leaf). L is 1 where nothing is needed.
+struct EntryFactor {
+    float lipschitz = 1;
+    float margin = 0;
+    bool bounded = false;  ///< the box is finite, so the bounded-leaf form applies
+};
+EntryFactor entry_factor(const Warp& warp, const Box3& solid_after);
+
+}  // namespace kiln::sdf

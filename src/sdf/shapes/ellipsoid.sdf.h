@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: MIT
+// Ellipsoid with its axes along x, y and z. Exact to rounding.
+//
+// The nearest point q of p >= 0 has p - q = t n(q), that is q_i = r_i² p_i / (t + r_i²) with Σ (r_i p_i / (t + r_i²))² = 1, t above
+// -(smallest r)². Newton's method on 1/|v(t)| = 1, v_i = r_i p_i / (t + r_i²), a concave and almost linear function of t (Moré and
+// Sorensen, "Computing a Trust Region Step", 1983), rises to the root from any point below it.
+// The answer does not trust the root: for every direction w the plane that touches the ellipsoid there is no farther than the
+// ellipsoid, so (w·p - |r w|) / |w| is a lower bound of the signed distance whatever t was, and off by the square of t's error.
+// With w_i = p_i / (t + r_i²) it is t |w| + |v| (|v| - 1) / |w|, which does not cancel.
+
+struct Ellipsoid {
+    param3 radii;  // = (0.5, 0.35, 0.25) m, > 0: centre to surface along each axis
+};
+
+KILN_SDF real sd_ellipsoid(real3 p, Ellipsoid s) {
+    // In units of the largest radius. tau = t + low² > 0, so that the denominators tau + (r_i² - low²) do not cancel.
+    param unit = max(s.radii.x, max(s.radii.y, s.radii.z));
+    param3 r = s.radii / unit;
+    param low = min(r.x, min(r.y, r.z));
+    param3 e = param3((r.x - low) * (r.x + low), (r.y - low) * (r.y + low), (r.z - low) * (r.z + low));
+    // On the planes of symmetry the nearest point is not unique: step off them by less than rounding.
+    param off = low * KILN_C(1e-9);
+    real3 q = max(abs(p) / unit, real3(off, off, off));
+    real tau = max(r.x * q.x - e.x, max(r.y * q.y - e.y, r.z * q.z - e.z));
+    for (int i = 0; i < 7; ++i) {
+        real3 k = real3(e.x + tau, e.y + tau, e.z + tau);
+        real3 v = r * q / k;
+        real3 vv = v * v;
+        real n2 = vv.x + vv.y + vv.z;
+        real slope = vv.x / k.x + vv.y / k.y + vv.z / k.z;
+        tau = tau + (sqrt(n2) - 1.0f) * n2 / slope;
+    }
+    real3 w = q / real3(e.x + tau, e.y + tau, e.z + tau);
+    real n = length(r * w);
+    real size = length(w);
+    return ((tau - low * low) * size + n * (n - 1.0f) / size) * unit;
+}
+
+#ifdef KILN_HOST
+KILN_SDF Bounds bounds_ellipsoid(Ellipsoid s) { return symmetric(s.radii.x, s.radii.y, s.radii.z); }
+#endif

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+// The tape interpreter in GLSL: the twin of eval_lanes.inl, one point at a time. A kernel calls it from one place, inside a loop:
+// every inlined copy costs compile time.
+// The including kernel declares, before this file:
+//   uvec2 sdf_code(uint at)      instruction `at`: word, param
+//   float sdf_param(uint at)     number `at` of Program::params
+//   float sdf_sample(uint at)    number `at` of Program::samples
+// Then: float tape_distance(uint first, uint count, vec3 p_world), or, with KILN_TAPE_MATERIALS defined,
+//       float tape_materials(uint first, uint count, vec3 p_world, out Mix mix).
+
+#include "sdf/lang/lang.glsl"
+#define KILN_T float
+#include "sdf/lang/trig.sdf.h"
+#undef KILN_T
+#ifdef KILN_TAPE_MATERIALS
+#include "sdf/lang/material.sdf.h"
+#endif
+#include "sdf/texts.gen.glsl"
+// From here on plain GLSL: the names of the shape language would get in the way of it.
+#undef real
+#undef real2
+#undef real3
+#undef param
+#undef param2
+#undef param3
+#undef mask
+#undef whole
+#undef both
+#undef either
+#undef no
+#undef select
+#undef lt
+#undef le
+#undef gt
+#undef ge
+
+const int kTapeRegisters = 24;
+const float kTapeEmpty = 1e30;
+const float kTapeEmptyTest = 1e29;
+const uint kNoMaterial = 65535u;
+
+// Values of sdf::Opcode.
+const uint kOpPointCell = 0u;
+const uint kOpPointTranslate = 1u;
+const uint kOpPointAffine = 2u;
+const uint kOpPointAffineOn = 3u;
+const uint kOpPointWarp = 4u;
+const uint kOpPointCopy = 5u;
+const uint kOpPointClamp = 6u;
+const uint kOpShape = 7u;
+const uint kOpValue = 8u;
+const uint kOpBound = 9u;
+const uint kOpCombine = 10u;
+const uint kOpMove = 11u;
+const uint kOpNegate = 12u;
+const uint kOpEmpty = 13u;
+const uint kOpTake = 14u;
+const uint kOpConstant = 15u;
+const uint kOpPaint = 3u;  // value of kiln::Op::Paint
+
+vec3 tape_vec3(uint at) { return vec3(sdf_param(at), sdf_param(at + 1u), sdf_param(at + 2u)); }
+
+// Row-major 3x3 matrix times (p - t), numbers t[3] M[9].
+vec3 tape_affine(vec3 p, uint at) {
+    vec3 q = p - tape_vec3(at);
+    return vec3(sdf_param(at + 3u) * q.x + sdf_param(at + 4u) * q.y + sdf_param(at + 5u) * q.z,
+                sdf_param(at + 6u) * q.x + sdf_param(at + 7u) * q.y + sdf_param(at + 8u) * q.z,
+                sdf_param(at + 9u) * q.x + sdf_param(at + 10u) * q.y + sdf_param(at + 11u) * q.z);
+}
+
+#ifdef KILN_TAPE_MATERIALS
+float tape_materials(uint first, uint count, vec3 p_world, out Mix mix_out) {
+    Mix mixes[kTapeRegisters];
+#else
+float tape_distance(uint first, uint count, vec3 p_world) {
+#endif
+    float value[kTapeRegisters];
+    vec3 p = p_world;
+    for (uint pc = first; pc < first + count; ++pc) {
+        uvec2 instruction = sdf_code(pc);
+        uint word = instruction.x;
+        uint at = instruction.y;
+        uint aux = (word >> 4u) & 255u;
+        uint dst = (word >> 12u) & 31u;
+        uint a = (word >> 17u) & 31u;
+        uint b = (word >> 22u) & 31u;
+        switch (word & 15u) {
+            case kOpPointCell: p = p_world; break;
+            case kOpPointTranslate: p = p_world - tape_vec3(at); break;
+            case kOpPointAffine:
+            case kOpPointAffineOn: p = tape_affine((word & 15u) == kOpPointAffine ? p_world : p, at); break;
+            case kOpPointWarp: p = point_warp(aux, p, at); break;
+            case kOpPointCopy: p = copy_warp(aux, p, at + 6u, tape_vec3(at), tape_vec3(at + 3u)); break;
+            case kOpPointClamp: p = clamp(p, tape_vec3(at), tape_vec3(at + 3u)); break;
+            case kOpShape:
+                value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);
+#ifdef KILN_TAPE_MATERIALS
+                mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+#endif
+                break;
+            case kOpValue: value[dst] = value_warp(aux, value[dst] * sdf_param(at + 1u), p, at + 2u) * sdf_param(at); break;
+            case kOpBound: {
+                vec3 gap = max(max(tape_vec3(at + 2u) - p, p - tape_vec3(at + 5u)), vec3(0.0));
+                value[dst] = max(min(value[dst], sdf_param(at + 1u)), length(gap) * sdf_param(at));
+                break;
+            }
+            case kOpCombine: {
+                uint op = aux & 3u;
+                float x = value[a];
+                float y = value[b];
+#ifdef KILN_TAPE_MATERIALS
+                float share = op == kOpPaint ? share_min(0.0, y, sdf_param(at + 1u)) : op_share(op, x, y, sdf_param(at + 1u));
+                mixes[dst] = blend_mix(mixes[a], mixes[b], share);
+#endif
+                value[dst] = op == kOpPaint ? x : op_distance(op, x, y, sdf_param(at));
+                break;
+            }
+            case kOpMove:
+            case kOpNegate:
+                value[dst] = (word & 15u) == kOpNegate ? -value[a] : value[a];
+#ifdef KILN_TAPE_MATERIALS
+                mixes[dst] = mixes[a];
+#endif
+                break;
+            case kOpEmpty:
+                value[dst] = kTapeEmpty;
+#ifdef KILN_TAPE_MATERIALS
+                mixes[dst] = make_mix(float(kNoMaterial), float(kNoMaterial), 0.0);
+#endif
+                break;
+            case kOpTake:
+                value[dst] = aux == 1u ? -value[b] : value[b];
+#ifdef KILN_TAPE_MATERIALS
+                if (mixes[b].id0 == float(kNoMaterial)) {
+                    mixes[dst] = mixes[a];
+                } else {
+                    mixes[dst] = mixes[b];
+                }
+#endif
+                break;
+            case kOpConstant:
+                value[dst] = 0.0;
+#ifdef KILN_TAPE_MATERIALS
+                mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+#endif
+                break;
+            default: break;
+        }
+    }
+#ifdef KILN_TAPE_MATERIALS
+    mix_out = mixes[0];
+#endif
+    return value[0];
+}
