@@ -4,7 +4,7 @@
 // goes to the error sink as one sentence (through the validate decorator) and comes back as a Result where there is one.
 #pragma once
 
-#include "kiln/result.h"
+#include <kiln/result.h>
 #include "rhi/commands.h"
 #include "rhi/spirv_reflect.h"
 #include "rhi/types.h"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "rhi/reporter.h"
 
-#include <cstdio>
+#include "base/log.h"
 
 namespace kiln::rhi {
 
@@ -15,7 +15,7 @@ void Reporter::operator()(std::string_view sentence) {
     if (sink_) {
         sink_(sentence);
     } else {
-        std::fprintf(stderr, "rhi: %.*s\n", int(sentence.size()), sentence.data());
+        log::error("rhi: {}", sentence);
     }
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Where a device's complaints go: the sink the user gave, else standard error.
+// Where a device's complaints go: the sink the user gave, else the log.
 #pragma once
 
 #include "rhi/device.h"

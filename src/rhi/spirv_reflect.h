@@ -3,7 +3,7 @@
 // Reads the binary directly; knows the instructions that shaders compiled from our GLSL contain.
 #pragma once
 
-#include "kiln/result.h"
+#include <kiln/result.h>
 #include "rhi/types.h"
 
 namespace kiln::rhi {
