@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT
+// Kernels (a shader by name) and the library of pipelines made from them. Every pipeline is made by warm_up(), so that no
+// frame stops to compile one; what a frame makes in spite of that is counted and logged.
+#pragma once
+
+#include "rhi/device.h"
+
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace kiln::render {
+
+// A compute shader. Kernels are constants beside the pass that runs them and outlive every graph:
+//   constexpr Kernel kBloomThreshold{"bloom threshold", kBloomThresholdSpv};
+// The name identifies it: two kernels of one name are one kernel.
+struct Kernel {
+    std::string_view name;
+    std::span<const uint32_t> spirv;
+    std::span<const rhi::SpecConstant> constants = {};
+};
+
+// A vertex and a fragment shader with the fixed state between them. Formats of the targets come from the pass.
+struct RasterKernel {
+    std::string_view name;
+    std::span<const uint32_t> vertex;
+    std::span<const uint32_t> fragment;
+    std::span<const rhi::ColorTarget> colors = {};  // formats, blending, masks
+    rhi::DepthState depth = {};
+    std::span<const rhi::VertexBufferLayout> vertex_buffers = {};
+    rhi::Topology topology = rhi::Topology::TriangleList;
+    rhi::Cull cull = rhi::Cull::None;
+};
+
+// What kernels say about their bindings. Needs no device. Reflects each kernel once.
+class Reflections {
+public:
+    // Vertex and fragment stages of one pipeline are folded into one list of bindings. Null with `error` set for bad SPIR-V.
+    const rhi::Reflection* of(const Kernel& kernel, std::string& error);
+    const rhi::Reflection* of(const RasterKernel& kernel, std::string& error);
+    void forget(std::string_view name);
+
+private:
+    struct Entry {
+        std::span<const uint32_t> words;
+        std::unique_ptr<rhi::Reflection> reflection;
+    };
+    std::map<std::string, Entry, std::less<>> entries_;
+};
+
+// Owner's thread.
+class PipelineLibrary {
+public:
+    explicit PipelineLibrary(rhi::Device& device) : device_(&device) {}
+    ~PipelineLibrary();
+    PipelineLibrary(const PipelineLibrary&) = delete;
+    PipelineLibrary& operator=(const PipelineLibrary&) = delete;
+
+    // Makes what is missing. From now on a pipeline made on demand counts as made_late().
+    Result<void> warm_up(std::span<const Kernel* const> kernels, std::span<const RasterKernel* const> raster = {});
+    Result<rhi::ComputePipeline> get(const Kernel& kernel);
+    Result<rhi::RenderPipeline> get(const RasterKernel& kernel);
+
+    // Other words for the kernel of this name, from the next frame on. The bindings, push data and workgroup must be the
+    // same, otherwise an error says which differ and the old pipeline stays.
+    Result<void> replace(const Kernel& kernel, std::span<const uint32_t> spirv);
+
+    uint64_t made() const { return made_; }
+    uint64_t made_late() const { return made_late_; }  // after warm_up(): each one was a stutter
+
+private:
+    struct Compute {
+        const uint32_t* words;  // identifies the kernel that owns the name
+        std::vector<uint32_t> replaced = {};
+        rhi::ComputePipeline pipeline = {};
+    };
+    struct Raster {
+        const uint32_t* words;
+        rhi::RenderPipeline pipeline = {};
+    };
+    Result<rhi::ComputePipeline> make(const Kernel& kernel, std::span<const uint32_t> spirv);
+    void count(std::string_view name);
+
+    rhi::Device* device_;
+    std::map<std::string, Compute, std::less<>> compute_;
+    std::map<std::string, Raster, std::less<>> raster_;
+    uint64_t made_ = 0, made_late_ = 0;
+    bool warm_ = false;
+};
+
+}  // namespace kiln::render
