@@ -48,8 +48,10 @@ class Field {
 public:
     /// Builds from nothing. `program` is kept alive by the field.
     static Result<std::shared_ptr<const Field>> build(std::shared_ptr<const sdf::Program> program, const FieldOptions& options);
-    /// The field of a changed program, given boxes (world metres, already the union of before and after, inflated by influence) outside
-    /// which nothing changed. Equal, brick for brick and bit for bit, to build(program), except for slot numbers.
+    /// The field of a changed program. Equal, brick for brick and bit for bit, to build(program), except for slot numbers and for where
+    /// code lies. What changed is found by comparing pruned code from the whole grid downwards, so `dirty` is only a hint: boxes (world
+    /// metres: solids of changed edits before and after, inflated by EditSpan::reach) within whose band bricks are baked without asking
+    /// whether their texels differ. Elsewhere a brick is a job only if its stored bits change.
     static Result<std::shared_ptr<const Field>> update(const Field& old, std::shared_ptr<const sdf::Program> program,
                                                        std::span<const Box3> dirty);
 
