@@ -233,7 +233,8 @@ private:
         expand_content(task);
     }
 
-    // R = max(min(R, m), distance(p, box)): the bounded leaf of architecture §4.
+    // R = max(min(R, m), signed distance(p, box)). The solid lies in the box, so inside it the box's distance never wins; outside
+    // it takes over where the child's factor is no longer proven.
     void add_bound(Task& task, uint32_t chain, const Box3& box, float margin) {
         Binary bound;
         bound.kind = Binary::Kind::Bound;

@@ -34,10 +34,11 @@ static inline real3 affine(real3 p, const float* w) {
                  param(w[9]) * q.x + param(w[10]) * q.y + param(w[11]) * q.z);
 }
 
-// Distance of p from the box, 0 inside.
-static inline real box_gap(real3 p, param3 lo, param3 hi) {
-    const real3 q = max(max(lo - p, p - hi), real3(real(0.0f), real(0.0f), real(0.0f)));
-    return length(q);
+// Signed distance of p from the box; its faces may be infinite.
+static inline real box_distance(real3 p, param3 lo, param3 hi) {
+    const real zero = real(param(0));
+    const real3 q = max(real3(lo) - p, p - real3(hi));
+    return length(max(q, real3(zero, zero, zero))) + min(max(q.x, max(q.y, q.z)), zero);
 }
 
 // One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
@@ -78,8 +79,8 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
             break;
         case Opcode::Bound:
             for (int i = 0; i < KILN_VECTORS; ++i) {
-                const real gap = box_gap(point_at(r.point, i), param3_at(w + 2), param3_at(w + 5)) * param(w[0]);
-                dst.v[i] = max(min(dst.v[i], real(param(w[1]))), gap);
+                const real box = box_distance(point_at(r.point, i), param3_at(w + 2), param3_at(w + 5)) * param(w[0]);
+                dst.v[i] = max(min(dst.v[i], real(param(w[1]))), box);
             }
             break;
         default: __builtin_unreachable();

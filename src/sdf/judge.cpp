@@ -49,9 +49,9 @@ real3 into_node(const Transform& transform, real3 p) {
 
 real3 to_real3(vec3 v) { return real3(v.x, v.y, v.z); }
 
-double gap(real3 p, const Box3& box) {
-    const real3 q = max(max(to_real3(box.min) - p, p - to_real3(box.max)), real3(0, 0, 0));
-    return length(q);
+double box_distance(real3 p, const Box3& box) {
+    const real3 q = max(to_real3(box.min) - p, p - to_real3(box.max));
+    return length(max(q, real3(0, 0, 0))) + std::min(std::max({q.x, q.y, q.z}), 0.0);
 }
 
 double combine(Op op, double a, double b, double k) { return op == Op::Paint ? a : judging::op_distance(uint32_t(op), a, b, k); }
@@ -130,7 +130,7 @@ double Judge::distance(dvec3 p_world) const {
                             }
                         }
                         if (!exact && std::isfinite(spacing)) {
-                            answer = std::max(std::min(answer, 0.5 * spacing), gap(copy(f.step - 1), child));
+                            answer = std::max(std::min(answer, 0.5 * spacing), box_distance(copy(f.step - 1), child));
                         }
                         f.value = f.step == 1 ? answer : std::min(f.value, answer);
                     }
@@ -157,7 +157,7 @@ double Judge::distance(dvec3 p_world) const {
                 } else {
                     if (how == KindRow::Value) answer = judging::value_warp(warp.kind, answer, f.p, warp.params.data());
                     answer /= double(factor.lipschitz);
-                    if (bound) answer = std::max(std::min(answer, double(factor.margin)), gap(f.p, solid));
+                    if (bound) answer = std::max(std::min(answer, double(factor.margin)), box_distance(f.p, solid));
                     stack.pop_back();
                 }
                 continue;

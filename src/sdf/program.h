@@ -39,7 +39,7 @@ enum class Opcode : uint32_t {
     PointClamp,      // P = clamp(P, lo, hi)    lo[3] hi[3]
     Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
     Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
-    Bound,           // R[dst] = max(min(R[dst], m), s · distance(P, box))   s, m, lo[3] hi[3]
+    Bound,           // R[dst] = max(min(R[dst], m), s · signed distance(P, box))   s, m, lo[3] hi[3]
     Combine,         // R[dst] = op[aux & 3](R[a], R[b], k)        k, k of materials. aux & 3 = Op (Paint keeps R[a]'s distance);
                      //                                            aux & kMayLackMaterial: R[b] may carry no material
     Move,            // R[dst] = R[a]

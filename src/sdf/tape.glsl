@@ -100,8 +100,9 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                 break;
             case kOpValue: value[dst] = value_warp(aux, value[dst] * sdf_param(at + 1u), p, at + 2u) * sdf_param(at); break;
             case kOpBound: {
-                vec3 gap = max(max(tape_vec3(at + 2u) - p, p - tape_vec3(at + 5u)), vec3(0.0));
-                value[dst] = max(min(value[dst], sdf_param(at + 1u)), length(gap) * sdf_param(at));
+                vec3 q = max(tape_vec3(at + 2u) - p, p - tape_vec3(at + 5u));
+                float box = length(max(q, vec3(0.0))) + min(max(q.x, max(q.y, q.z)), 0.0);
+                value[dst] = max(min(value[dst], sdf_param(at + 1u)), box * sdf_param(at));
                 break;
             }
             case kOpCombine: {

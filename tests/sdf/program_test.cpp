@@ -219,6 +219,70 @@ TEST(Prune, PrunedTapeHasTheFullTapesBitsInItsBall) {
     EXPECT_LT(kept, full / 4) << "pruning should keep little of " << full;
 }
 
+TEST(Program, RepeatIsTheNearestOfAllCopiesAlsoOffCentreAndTurned) {
+    // A bar turned by 45 degrees that just fits its spacing: the copy whose cell the point is in is often not the nearest.
+    Node bar;
+    bar.shape = Box{.half_extents = {0.5f, 0.05f, 0.05f}};
+    bar.transform.position = {0.3f, 0.1f, -0.2f};
+    bar.transform.rotation = axis_angle({0, 1, 0}, 0.7853982f);
+    Object object;
+    object.nodes.emplace_back();
+    object.nodes[0].kind = Node::Kind::Fold;
+    object.nodes[0].children = {1};
+    object.nodes.push_back(bar);
+    object.nodes[0].domain = {Repeat{.spacing = {0.8f, 0, 0.8f}, .count = {0, 0, 5}}};
+    Scene s;
+    s.objects = {object};
+    Edit e;
+    e.node.kind = Node::Kind::Object;
+    e.node.object = ObjectId{0, 0};
+    s.edits = {e};
+    Scene one = s;
+    one.objects[0].nodes[0].domain.clear();
+    const auto many = compile(s.source());
+    const auto single = compile(one.source());
+    ASSERT_TRUE(many && single);
+    Random r(7);
+    int other_copy = 0;
+    for (int i = 0; i < 3000; ++i) {
+        const vec3 p{r.in(-1, 1), r.in(-0.3f, 0.5f), r.in(-2.5f, 2.5f)};
+        double nearest = 1e30, own = 1e30;
+        for (int x = -4; x <= 4; ++x) {
+            for (int z = -2; z <= 2; ++z) {
+                const double d = evaluate(view(*single), dvec3{p.x - 0.8f * float(x), p.y, p.z - 0.8f * float(z)});
+                nearest = std::min(nearest, d);
+                if (std::abs(p.x - 0.3f - 0.8f * float(x)) <= 0.4f && std::abs(p.z + 0.2f - 0.8f * float(z)) <= 0.4f) own = d;
+            }
+        }
+        other_copy += own < 1e29 && nearest < own - 1e-3;
+        // Farther than half a spacing the bound by boxes may be less; near the surface it is the distance.
+        const double d = evaluate(view(*many), dvec3{p.x, p.y, p.z});
+        EXPECT_LE(d, nearest + 1e-6);
+        if (nearest < 0.2) EXPECT_NEAR(d, nearest, 1e-6) << p.x << ' ' << p.y << ' ' << p.z;
+        const vec3 q = p + r.point(0.1f);
+        EXPECT_LE(std::abs(d - evaluate(view(*many), dvec3{q.x, q.y, q.z})), double(length(p - q)) * (1 + 1e-5) + 1e-6);
+    }
+    EXPECT_GT(other_copy, 100);
+}
+
+TEST(Program, AWarpedSolidIsTheImageOfTheBareOne) {
+    Edit e;
+    e.node.shape = Box{.half_extents = {0.4f, 1, 0.1f}};
+    e.node.domain = {Twist{.rate = 2}};
+    const std::vector<Edit> edits{e};
+    const auto program = compile({edits, {}, {}});
+    ASSERT_TRUE(program);
+    Random r(11);
+    for (int i = 0; i < 2000; ++i) {
+        const vec3 bare{r.in(-0.8f, 0.8f), r.in(-1.5f, 1.5f), r.in(-0.3f, 0.3f)};
+        const vec3 p = rotate(axis_angle({0, 1, 0}, 2 * bare.y), bare);  // right-handed about +Y
+        const vec3 outside = max(vec3{std::abs(bare.x), std::abs(bare.y), std::abs(bare.z)} - vec3{0.4f, 1, 0.1f}, {-1, -1, -1});
+        const float signed_max = std::max({outside.x, outside.y, outside.z});
+        const double d = evaluate(view(*program), dvec3{p.x, p.y, p.z});
+        EXPECT_EQ(d > 0, signed_max > 0) << bare.x << ' ' << bare.y << ' ' << bare.z;
+    }
+}
+
 TEST(Program, ADeepChainOfReferencesCompiles) {
     Scene s;
     constexpr uint32_t kDepth = 100000;
