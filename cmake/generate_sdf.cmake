@@ -120,7 +120,7 @@ function(kiln_generate_sdf)
     kiln_sdf_read_list(ops KILN_OP ops)
     kiln_sdf_read_list(domain KILN_WARP warps)
 
-    set(includes "#include \"sdf/ops/kernel.sdf.h\"\n")
+    set(includes "#include \"sdf/ops/kernel.sdf.h\"\n#include \"sdf/shapes/common.sdf.h\"\n")
     foreach(pair "ops:ops" "shapes:shapes" "domain:warps")
         string(REPLACE ":" ";" pair "${pair}")
         list(GET pair 0 folder)
