@@ -60,6 +60,7 @@ struct Frame {
     std::vector<Light> lights;
     Environment environment;
     Camera camera;
+    int coarsened = 0;                          ///< times the voxel size was doubled to fit the pool
 };
 
 struct RenderSettings {
@@ -124,6 +125,9 @@ private:
     explicit Renderer(std::unique_ptr<Impl> impl);
     std::unique_ptr<Impl> impl_;
 };
+
+/// Path-traces the frame on the CPU, `samples` a pixel: slow, needs no device; the judge of the renderer. Shaded view only.
+Result<Picture> render_reference(const Frame& frame, const RenderSettings& settings, int samples, RenderStats* stats = nullptr);
 
 /// Every device that could render here, usable or not; empty without a driver. Never fails.
 std::vector<DeviceInfo> devices();

@@ -70,6 +70,8 @@ public:
 
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;
+    /// Sections of the scene that this version reads and keeps but does not draw ("meshes", "fluids", …).
+    std::vector<std::string> not_drawn_yet() const;
 
     struct Impl;
 

@@ -98,7 +98,7 @@ std::optional<Error> check_object(const Object& object, size_t objects, size_t m
             return fault("paint is an operation of edits, not of trees; use union, subtract or intersect");
         if (node.children.empty()) return fault("a fold without children; give it at least one");
         if (auto f = check_length("blend_radius", node.blend_radius, true)) return f;
-        if (auto f = check_length("material_blend_radius", node.material_blend_radius, true)) return f;
+        if (auto f = check_length("material_blend_radius", node.material_blend_radius, false)) return f;
         for (const uint32_t c : node.children) {
             if (c <= n || c >= object.nodes.size())
                 return fault(formatted("child {} of node {}: children have higher indices than their parent", c, n));

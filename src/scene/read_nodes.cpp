@@ -146,7 +146,6 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         out.kind = Node::Kind::Object;
         out.object = {found->second, 0};
     }
-    bool own_material_blend = false;
     if (children_at) {
         if (!doc.is(*children_at, JsonType::Array)) return in_.wrong_type(*children_at, "an array of nodes");
         if (doc.first(*children_at) == doc.next(*children_at))
@@ -199,7 +198,6 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         } else if (key == "blend_radius") {
             ok = in_.numbers(m, row->numbers, edit ? &edit->blend_radius : &out.blend_radius);
         } else if (key == "material_blend_radius") {
-            own_material_blend = true;
             ok = in_.numbers(m, row->numbers, edit ? &edit->material_blend_radius : &out.material_blend_radius);
         } else if (edit && key == "id") {
             ok = in_.text(m, "lump", &edit->name);
@@ -215,7 +213,6 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         }
         if (!ok) return false;
     }
-    if (out.kind == Node::Kind::Fold && !own_material_blend) out.material_blend_radius = out.blend_radius;
     if (edit && edit->op == Op::Paint && !out.material)
         return in_.fail(at, "paint without a material; add \"material\"");
     return true;

@@ -45,7 +45,7 @@ private:
     bool field() {
         const auto at = section("field");
         if (!at) return true;
-        FieldSettings& f = scene_.field;
+        FieldSettings& f = scene_.stage.field;
         if (!in_.table(*at, kFieldTable, &f.voxel_size)) return false;
         if (const auto v = doc_.find(*at, "levels")) f.levels = int(doc_.number(*v));
         if (const auto v = doc_.find(*at, "cells")) {
@@ -101,7 +101,7 @@ private:
             if (light.kind == Light::Kind::Spot && light.inner_deg > light.outer_deg)
                 return in_.fail(c, formatted("inner_deg {} is above outer_deg {}; it must not be",
                                              shortest(light.inner_deg), shortest(light.outer_deg)));
-            scene_.lights.push_back(light);
+            scene_.stage.lights.push_back(light);
         }
         return true;
     }
@@ -111,7 +111,7 @@ private:
         if (!at) return true;
         Environment e;
         if (!in_.table(*at, kEnvironmentTable, &e.color.x)) return false;
-        scene_.environment = e;
+        scene_.stage.environment = e;
         if (doc_.find(*at, "file")) scene_.undrawn.push_back("environment.file");
         return true;
     }
@@ -131,7 +131,7 @@ private:
             if (!(length(forward) > 0)) return in_.fail(c, "position and target are the same point; move one of them");
             if (const auto u = doc_.find(c, "up"); u && !(length(camera.up) > 1e-6f))
                 return in_.fail(*u, "an up of length 0; write [0, 1, 0]");
-            scene_.cameras.emplace_back(doc_.key(c), camera);
+            scene_.stage.cameras.emplace_back(doc_.key(c), camera);
         }
         return true;
     }

@@ -16,16 +16,21 @@ namespace kiln::scene {
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
 /// sections that the engine does not act on yet, and how it wrote what has two forms.
 struct SceneData {
+    /// What a program may change freely: World's public members.
+    struct Stage {
+        FieldSettings field;
+        std::vector<Light> lights;
+        std::optional<Environment> environment;
+        std::vector<std::pair<std::string, Camera>> cameras;
+    };
+
     JsonDocument source;
     std::string folder;  ///< paths in the scene are relative to it; empty: the current folder
     std::string description;
-    FieldSettings field;
+    Stage stage;
     std::vector<std::pair<std::string, Material>> materials;  ///< MaterialId::index refers here
     std::vector<Object> objects;                              ///< ObjectId::index refers here
     std::vector<Edit> edits;
-    std::vector<Light> lights;
-    std::optional<Environment> environment;
-    std::vector<std::pair<std::string, Camera>> cameras;
 
     // Where things stand in `source`; kNowhere for what was added later.
     static constexpr JsonIndex kNowhere = UINT32_MAX;
@@ -39,7 +44,7 @@ struct SceneData {
 /// Errors read "NAME:LINE:COLUMN: path.to.key: what is wrong; what would be right".
 Result<SceneData> read_scene(std::string text, const std::string& name);
 /// The scene as it is saved. Canonical: reading it and writing it again gives the same bytes.
-std::string write_scene(const SceneData& scene);
+std::string write_scene(const SceneData& scene, const SceneData::Stage& stage);
 
 /// A fault of one edit or object given by code; nothing when the reader would accept it.
 std::optional<Error> check_edit(const Edit& edit, size_t objects, size_t materials);

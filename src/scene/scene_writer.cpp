@@ -18,7 +18,7 @@ using Members = std::vector<std::pair<std::string_view, JsonIndex>>;  // key, wh
 
 class SceneWriter {
 public:
-    explicit SceneWriter(const SceneData& scene) : scene_(scene), old_(scene.source) {}
+    SceneWriter(const SceneData& scene, const SceneData::Stage& stage) : scene_(scene), stage_(stage), old_(scene.source) {}
 
     std::string run() {
         out_.open(JsonType::Object);
@@ -95,14 +95,14 @@ private:
         } else if (key == "environment") {
             environment(at);
         } else if (key == "cameras") {
-            named(key, at, scene_.cameras, [&](const Camera& c, JsonIndex was) { camera(c, was); });
+            named(key, at, stage_.cameras, [&](const Camera& c, JsonIndex was) { camera(c, was); });
         } else {
             keep(key, at);
         }
     }
 
     void field(JsonIndex at) {
-        const FieldSettings& f = scene_.field;
+        const FieldSettings& f = stage_.field;
         if (at == kNowhere && f.voxel_size <= 0 && f.cells == 64 && f.levels == 1 && !f.bounds && !f.distance_8bit)
             return;
         out_.open(JsonType::Object, "field");
@@ -156,10 +156,10 @@ private:
     }
 
     void lights(JsonIndex at) {
-        if (at == kNowhere && scene_.lights.empty()) return;
+        if (at == kNowhere && stage_.lights.empty()) return;
         out_.open(JsonType::Array, "lights");
         JsonIndex was = at == kNowhere ? kNowhere : old_.first(at);
-        for (const Light& light : scene_.lights) {
+        for (const Light& light : stage_.lights) {
             const bool known = was != kNowhere && was < old_.next(at);
             out_.open(JsonType::Object);
             const auto bit = uint8_t(1u << int(light.kind));
@@ -181,13 +181,13 @@ private:
     }
 
     void environment(JsonIndex at) {
-        if (!scene_.environment) return;
+        if (!stage_.environment) return;
         out_.open(JsonType::Object, "environment");
         for (const auto& [k, w] : members(at, kEnvironmentTable)) {
             if (k == "file") {
                 keep(k, w);
             } else {
-                number_row(*find_row(kEnvironmentTable, k), w, &scene_.environment->color.x);
+                number_row(*find_row(kEnvironmentTable, k), w, &stage_.environment->color.x);
             }
         }
         out_.close();
@@ -265,8 +265,7 @@ private:
         }
         if (key == "material_blend_radius" && folds) {
             const float k = edit ? edit->material_blend_radius : node.material_blend_radius;
-            const bool linked = edit ? k < 0 : k == node.blend_radius && at == kNowhere;
-            return linked ? void() : numbers(key, at, &k, 1);
+            return k < 0 ? void() : numbers(key, at, &k, 1);  // negative: linked to blend_radius
         }
         if (key == "position") return put(&t.position.x, 3, t.position == vec3{});
         if (key == "rotation") return put(&t.rotation.x, 4, t.rotation == quat{});
@@ -344,12 +343,13 @@ private:
     }
 
     const SceneData& scene_;
+    const SceneData::Stage& stage_;
     const JsonDocument& old_;
     JsonDocument out_;
 };
 
 }  // namespace
 
-std::string write_scene(const SceneData& scene) { return SceneWriter(scene).run(); }
+std::string write_scene(const SceneData& scene, const SceneData::Stage& stage) { return SceneWriter(scene, stage).run(); }
 
 }  // namespace kiln::scene

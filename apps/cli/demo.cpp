@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: MIT
+// kiln demo [NAME]: a bundled scene as NAME.png in the current folder.
+
+#include "cli/picture.h"
+#include "cli/talk.h"
+#include "cli/verbs.h"
+
+#include <kiln/world.h>
+
+#include <memory>
+
+namespace kiln::cli {
+
+namespace {
+
+struct Options {
+    PictureOptions picture;
+    bool list = false;
+};
+
+int demo(Options o) {
+    const auto scenes = bundled_scenes();
+    if (o.list) {
+        for (const auto& [name, description] : scenes) (void)put(name + std::string(name.size() < 9 ? 9 - name.size() : 1, ' ') + description + "\n");
+        return finish_data();
+    }
+    std::vector<std::string_view> names;
+    bool known = false;
+    for (const auto& [name, description] : scenes) {
+        names.push_back(name);
+        known = known || name == o.picture.scene;
+    }
+    if (!known) {
+        const std::string_view near = nearest_word(o.picture.scene, names);
+        say("kiln demo: there is no demo \"" + o.picture.scene + "\"; " +
+            (near.empty() ? "`kiln demo --list` lists them" : "did you mean " + std::string(near) + "?"));
+        return kUsage;
+    }
+    o.picture.output = o.picture.scene + ".png";
+    o.picture.transcript = true;
+    return render_picture(o.picture);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    o->picture.scene = "quarry";
+    CLI::App* verb = app.add_subcommand("demo",
+                                        "Draws a bundled scene to NAME.png in this folder.\n\n"
+                                        "Examples:\n"
+                                        "  kiln demo\n"
+                                        "  kiln demo orbit\n"
+                                        "  kiln demo --list");
+    verb->add_option("NAME", o->picture.scene, "a bundled scene")->capture_default_str();
+    verb->add_flag("--list", o->list, "the bundled scenes, on stdout");
+    verb->add_option("--size", o->picture.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    verb->add_option("--device", o->picture.device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
+    verb->callback([o, &run] { run = [o] { return demo(*o); }; });
+}
+
+}  // namespace kiln::cli

@@ -1,0 +1,99 @@
+// SPDX-License-Identifier: MIT
+// kiln inspect SCENE: what is in a scene. kiln validate SCENE: whether it is right. kiln schema: what a right one looks like.
+
+#include "cli/json.h"
+#include "cli/talk.h"
+#include "cli/verbs.h"
+
+#include <kiln/world.h>
+
+#include <memory>
+
+namespace kiln::cli {
+
+namespace {
+
+struct Options {
+    std::string scene;
+    bool json = false;
+};
+
+// The facts without JSON's brackets and quotes.
+std::string for_people(const std::string& json) {
+    std::string out, line;
+    for (const char c : json) {
+        if (c != '\n') {
+            if (c != '"') line += c;
+            continue;
+        }
+        while (!line.empty() && (line.back() == ',' || line.back() == '{' || line.back() == '[')) line.pop_back();
+        const size_t first = line.find_first_not_of(" }]");
+        if (first != std::string::npos) out += line.substr(std::min<size_t>(2, first)) + "\n";
+        line.clear();
+    }
+    return out;
+}
+
+int inspect(const Options& o) {
+    auto world = World::load(o.scene);
+    if (!world) return fail(world.error());
+    const std::string facts = world->inspect_json();
+    (void)put(o.json ? facts : for_people(facts));
+    return finish_data();
+}
+
+int validate(const Options& o) {
+    auto world = World::load(o.scene);
+    if (o.json) {
+        Json json;
+        json.text("scene", o.scene).flag("valid", bool(world));
+        if (world) json.number("edits", double(world->edits().size()));
+        if (!world) json.text("error", world.error().message);
+        (void)put(json.line());
+    }
+    if (!world) return fail(world.error());
+    if (!o.json) (void)put(o.scene + ": valid, " + std::to_string(world->edits().size()) + " edits\n");
+    return finish_data();
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("inspect",
+                                        "Tells what is in a scene. Needs no device.\n\n"
+                                        "Examples:\n"
+                                        "  kiln inspect quarry\n"
+                                        "  kiln inspect my.kiln.json --json");
+    verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
+    verb->add_flag("--json", o->json, "one object, on stdout");
+    verb->callback([o, &run] { run = [o] { return inspect(*o); }; });
+}
+
+void add_validate(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("validate",
+                                        "Checks a scene; the error tells file, line, column, key and mend. Needs no device.\n\n"
+                                        "Examples:\n"
+                                        "  kiln validate my.kiln.json");
+    verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
+    verb->add_flag("--json", o->json, "one object, on stdout");
+    verb->callback([o, &run] { run = [o] { return validate(*o); }; });
+}
+
+void add_schema(CLI::App& app, Run& run) {
+    CLI::App* verb = app.add_subcommand("schema",
+                                        "Prints the JSON Schema (2020-12) of scenes.\n\n"
+                                        "Examples:\n"
+                                        "  kiln schema > kiln.schema.json");
+    auto json = std::make_shared<bool>(false);
+    verb->add_flag("--json", *json, "changes nothing: it is JSON");
+    verb->callback([json, &run] {
+        run = [] {
+            (void)put(scene_schema_json());
+            return finish_data();
+        };
+    });
+}
+
+}  // namespace kiln::cli

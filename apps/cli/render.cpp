@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: MIT
+// kiln render SCENE -o OUT: one picture.
+
+#include "cli/picture.h"
+#include "cli/talk.h"
+#include "cli/verbs.h"
+
+#include <memory>
+
+namespace kiln::cli {
+
+void add_render(CLI::App& app, Run& run) {
+    auto o = std::make_shared<PictureOptions>();
+    CLI::App* verb = app.add_subcommand("render",
+                                        "Draws one picture of a scene.\n\n"
+                                        "Examples:\n"
+                                        "  kiln render potter -o potter.png\n"
+                                        "  kiln render my.kiln.json -o depth.exr --view depth --size 640x480\n"
+                                        "  kiln render quarry -o quarry.png --device cpu-vulkan --json");
+    verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
+    verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
+    verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
+    verb->add_option("--camera", o->camera, "a camera's name; left out: the scene's first");
+    verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps or bricks")->capture_default_str();
+    verb->add_option("--device", o->device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
+    verb->add_flag("--analytic", o->analytic, "march the edits themselves instead of the bricks");
+    verb->add_option("--reference", o->reference, "path-trace on the CPU with this many samples a pixel (no device needed)");
+    verb->add_flag("--unpruned", o->unpruned, "with --analytic: every edit at every step");
+    verb->add_flag("--no-accelerate", o->no_accelerate, "visit every cell: the slow twin of the jumps");
+    verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");
+    verb->add_flag("--json", o->json, "one object with what it took, on stdout");
+    verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
+    verb->callback([o, &run] { run = [o] { return render_picture(*o); }; });
+}
+
+}  // namespace kiln::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+
+#include "scene/bundled.h"
+
+#include "scene/json_source.h"
+
+#include <kiln/world.h>
+
+namespace kiln::scene {
+
+namespace {
+#include "scene/bundled.gen.inl"
+}  // namespace
+
+std::span<const BundledScene> bundled_files() { return kBundled; }
+
+}  // namespace kiln::scene
+
+namespace kiln {
+
+std::string_view version() { return scene::kVersion; }
+
+std::vector<std::pair<std::string, std::string>> bundled_scenes() {
+    std::vector<std::pair<std::string, std::string>> out;
+    for (const scene::BundledScene& file : scene::bundled_files()) {
+        std::string description;
+        if (auto document = scene::JsonDocument::parse(std::string(file.json), std::string(file.name)))
+            if (const auto at = document->find(0, "description")) description = document->text(*at);
+        out.emplace_back(file.name, std::move(description));
+    }
+    return out;
+}
+
+}  // namespace kiln

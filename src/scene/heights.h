@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: MIT
+// Height images of sampled shapes: loaded once each, and named by number in what the compiler reads.
+#pragma once
+
+#include "sdf/program.h"
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace kiln::scene {
+
+/// Images by file name as the scene writes it; kept between compilations.
+struct Grids {
+    std::vector<sdf::HeightGrid> grids;
+    std::map<std::string, uint32_t> by_file;
+};
+
+/// What sdf::compile reads. Edits and objects are copied only when some shape has a file.
+struct GridSource {
+    std::span<const Edit> edits;
+    std::span<const Object> objects;
+    std::vector<Edit> own_edits;
+    std::vector<Object> own_objects;
+    const Grids* grids = nullptr;
+
+    sdf::Source source() const { return {edits, objects, grids->grids}; }
+};
+
+/// Loads what is missing from `grids`, which must outlive the result. `folder` is put before relative names.
+Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects, const std::string& folder, Grids& grids,
+                              sdf::Fault* fault = nullptr);
+
+}  // namespace kiln::scene

@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: MIT
+// World: compiling, building its field, and answering questions from them.
+
+#include "scene/exact.h"
+#include "scene/framing.h"
+#include "scene/suggest.h"
+#include "scene/world_impl.h"
+
+#include "base/format.h"
+
+#include <nlohmann/json.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace kiln {
+
+namespace {
+
+/// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
+constexpr double kMaxCells = double(1u << 25);
+constexpr int kMostDoublings = 24;
+
+bool same(const FieldSettings& a, const FieldSettings& b) {
+    return a.voxel_size == b.voxel_size && a.cells == b.cells && a.levels == b.levels && a.bounds == b.bounds && a.distance_8bit == b.distance_8bit;
+}
+
+float longest_side(const Box3& box) {
+    const vec3 size = box.max - box.min;
+    return std::max({size.x, size.y, size.z});
+}
+
+double cells_of(const Box3& box, float voxel) {
+    const vec3 size = box.max - box.min;
+    const double cell = double(voxel) * field::kBrickVoxels;
+    return (double(size.x) / cell + 2) * (double(size.y) / cell + 2) * (double(size.z) / cell + 2);
+}
+
+}  // namespace
+
+void World::Impl::changed() {
+    const std::lock_guard lock(mutex);
+    program.reset();
+    built = {};
+}
+
+Result<std::shared_ptr<const sdf::Program>> World::Impl::compiled() {
+    const std::lock_guard lock(mutex);
+    if (program) return program;
+    sdf::Fault fault;
+    const auto placed = [&](Error error) -> Error {
+        // From the compiler's numbers back to the file.
+        const scene::JsonDocument& doc = data.source;
+        scene::JsonIndex at = scene::SceneData::kNowhere;
+        if (fault.object < data.object_places.size() && fault.node < data.object_places[fault.object].size()) {
+            at = data.object_places[fault.object][fault.node];
+        } else if (fault.object == UINT32_MAX && fault.edit < data.edit_places.size()) {
+            at = data.edit_places[fault.edit];
+        }
+        error.kind = ErrorKind::Input;
+        if (at == scene::SceneData::kNowhere) {
+            if (fault.edit < data.edits.size()) error.message = data.edits[fault.edit].name + ": " + error.message;
+            return error;
+        }
+        if (fault.warp >= 0) {
+            if (const auto domain = doc.find(at, "domain")) {
+                at = doc.first(*domain);
+                for (int i = 0; i < fault.warp; ++i) at = doc.next(at);
+            }
+        } else if (const auto file = doc.find(at, "file")) {
+            at = *file;
+        }
+        return doc.error(at, error.message);
+    };
+    auto source = scene::with_grids(data.edits, data.objects, data.folder, grids, &fault);
+    if (!source) return placed(source.error());
+    auto made = sdf::compile(source->source(), &fault);
+    if (!made) return placed(made.error());
+    program = std::make_shared<const sdf::Program>(std::move(*made));
+    return program;
+}
+
+World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const FieldSettings& settings) const {
+    Resolution out;
+    Box3 finite = p.bounds;
+    if (finite.empty()) finite = p.unbounded ? Box3{{-5, -5, -5}, {5, 5, 5}} : Box3{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
+    out.voxel_size = settings.voxel_size > 0 ? settings.voxel_size : std::max(longest_side(finite) / 256, 1e-6f);
+    if (settings.bounds) {
+        out.bounds = *settings.bounds;
+    } else {
+        // Inflated by 10 %, and by two voxels where the scene is flat.
+        const vec3 center = finite.center(), half = finite.half_extents() * 1.1f;
+        const float least = 2 * out.voxel_size;
+        const vec3 grown = max(half, finite.half_extents() + vec3{least, least, least});
+        out.bounds = {center - grown, center + grown};
+    }
+    return out;
+}
+
+Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
+    auto compiled_program = compiled();
+    if (!compiled_program) return compiled_program.error();
+    const std::lock_guard lock(mutex);
+    if (built.field && same(settings, built_with)) return built;
+    if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
+        return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
+    if (settings.bounds && (settings.bounds->empty() || !settings.bounds->finite()))
+        return Error{"field_settings.bounds must be finite, with min below max", ErrorKind::Usage};
+    const Resolution r = resolution(**compiled_program, settings);
+    Built next;
+    field::FieldOptions options;
+    options.voxel_size = r.voxel_size;
+    options.bounds = r.bounds;
+    options.format = settings.distance_8bit ? field::DistanceFormat::Snorm8 : field::DistanceFormat::Half;
+    for (;; ++next.coarsened, options.voxel_size *= 2) {
+        if (cells_of(options.bounds, options.voxel_size) > kMaxCells && next.coarsened < kMostDoublings) continue;
+        auto made = field::Field::build(*compiled_program, options);
+        if (made) {
+            next.field = std::move(*made);
+            break;
+        }
+        if (made.error().kind != ErrorKind::OutOfMemory || next.coarsened >= kMostDoublings) return made.error();
+    }
+    built = next;
+    built_with = settings;
+    return next;
+}
+
+float World::distance(vec3 p) const {
+    auto program = impl_->compiled();
+    if (!program) return std::numeric_limits<float>::infinity();
+    return float(scene::ExactField(**program).distance({double(p.x), double(p.y), double(p.z)}));
+}
+
+FieldSample World::sample(vec3 p, FieldSource source) const { return sample(std::span(&p, 1), source).front(); }
+
+std::vector<FieldSample> World::sample(std::span<const vec3> points, FieldSource source) const {
+    std::vector<FieldSample> out(points.size());
+    for (FieldSample& s : out) s.distance = std::numeric_limits<float>::infinity();
+    auto program = impl_->compiled();
+    if (!program) return out;
+    scene::ExactField(**program).sample(points, out.data());
+    if (source == FieldSource::Bricks) impl_->sample_bricks(points, field_settings, out.data());
+    return out;
+}
+
+RayHit World::cast(const Ray& ray) const {
+    auto program = impl_->compiled();
+    if (!program) return {};
+    RayHit hit = scene::ExactField(**program).cast(ray);
+    hit.edit = hit.hit && hit.edit.index < impl_->ids.size() ? impl_->ids[hit.edit.index] : EditId{};
+    return hit;
+}
+
+Box3 World::bounds() const {
+    auto program = impl_->compiled();
+    return program ? (*program)->bounds : Box3{};
+}
+
+Result<Frame> World::frame(std::string_view camera) const {
+    auto built = impl_->field(field_settings);
+    if (!built) return built.error();
+    Frame out;
+    out.field = built->field;
+    out.coarsened = built->coarsened;
+    out.materials.reserve(impl_->data.materials.size() + 1);
+    out.materials.emplace_back();  // sdf::kDefaultMaterial
+    for (const auto& [name, material] : impl_->data.materials) out.materials.push_back(material);
+    out.lights = lights;
+    if (out.lights.empty()) out.lights.push_back(scene::default_sun());
+    out.environment = environment.value_or(Environment{});
+    if (camera.empty()) {
+        out.camera = cameras.empty() ? scene::framing_camera(built->field->program().bounds) : cameras.front().second;
+        return out;
+    }
+    std::vector<std::string_view> names;
+    for (const auto& [name, value] : cameras) {
+        if (name == camera) {
+            out.camera = value;
+            return out;
+        }
+        names.push_back(name);
+    }
+    return Error{formatted("there is no camera \"{}\"; {}", camera, scene::suggestion(camera, names)), ErrorKind::Usage};
+}
+
+std::string World::inspect_json() const {
+    using Json = nlohmann::ordered_json;
+    const auto box_json = [](const Box3& b) -> Json {
+        if (b.empty() || !b.finite()) return nullptr;
+        return {{"min", {b.min.x, b.min.y, b.min.z}}, {"max", {b.max.x, b.max.y, b.max.z}}};
+    };
+    const scene::SceneData& data = impl_->data;
+    Json out;
+    out["description"] = data.description;
+    out["edits"] = data.edits.size();
+    size_t hidden = 0;
+    std::map<std::string, int> shapes, ops;
+    constexpr const char* kOps[] = {"union", "subtract", "intersect", "paint"};
+    for (const Edit& e : data.edits) {
+        hidden += e.hidden;
+        ++shapes[e.node.kind == Node::Kind::Shape ? std::string(sdf::shape_rows()[e.node.shape.kind].name) : "object"];
+        ++ops[kOps[size_t(e.op)]];
+    }
+    out["hidden"] = hidden;
+    out["shapes"] = shapes;
+    out["ops"] = ops;
+    out["objects"] = data.objects.size();
+    Json materials = Json::array(), camera_names = Json::array();
+    for (const auto& [name, material] : data.materials) materials.push_back(name);
+    for (const auto& [name, camera] : cameras) camera_names.push_back(name);
+    out["materials"] = materials;
+    out["lights"] = lights.size();
+    out["cameras"] = camera_names;
+    out["not_drawn_yet"] = data.undrawn;
+    if (auto program = impl_->compiled()) {
+        out["bounds"] = box_json((*program)->bounds);
+        out["unbounded"] = (*program)->unbounded;
+        out["instructions"] = (*program)->code.size();
+    }
+    if (auto built = impl_->field(field_settings)) {
+        const field::Field& f = *built->field;
+        const field::GridParams grid = f.grid();
+        uint32_t bricks = 0;
+        for (const field::BrickRecord& r : f.records()) bricks += r.code_count > 0;
+        const int bytes_a_texel = f.options().format == field::DistanceFormat::Half ? 2 : 1;
+        out["voxel_size"] = f.options().voxel_size;
+        out["grid_cells"] = {grid.size_x, grid.size_y, grid.size_z};
+        out["bricks"] = bricks;
+        out["brick_bytes"] = uint64_t(bricks) * uint64_t(field::kBrickTexelCount) * uint64_t(bytes_a_texel + 2);
+        out["coarsened"] = built->coarsened;
+    } else {
+        out["field_error"] = built.error().message;
+    }
+    return out.dump(2) + "\n";
+}
+
+std::vector<std::string> World::not_drawn_yet() const { return impl_->data.undrawn; }
+
+}  // namespace kiln
