@@ -3,7 +3,6 @@
 
 #include "sdf/resolve.h"
 
-#include "base/assert.h"
 #include "sdf/bounds.h"
 #include "sdf/library/library.h"
 #include "sdf/tables.h"
@@ -278,19 +277,15 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
     size_t index = 0;  // checked by the resolver
     std::from_chars(shape.data.data(), shape.data.data() + shape.data.size(), index);
     const HeightGrid& grid = source.grids[index];
-    const std::span<const FieldRow> fields = shape_rows()[shape.kind].fields();
-    const auto number = [&](std::string_view name, size_t component = 0) -> float& {
-        const auto row = std::find_if(fields.begin(), fields.end(), [&](const FieldRow& field) { return field.name == name; });
-        KILN_ASSERT(row != fields.end(), "sampled shapes have a field `{}`", name);
-        return params[size_t(row->offset) + component];
-    };
-    // Within a cell of the bilinear ground each derivative lies between those of two opposite edges.
-    const float slope_x = number("height") * grid_steps[index].x * float(grid.columns - 1) / number("size", 0);
-    const float slope_z = number("height") * grid_steps[index].y * float(grid.rows - 1) / number("size", 1);
-    number("first") = float(grid_first[index]);
-    number("columns") = float(grid.columns);
-    number("rows") = float(grid.rows);
-    number("slope") = std::sqrt(slope_x * slope_x + slope_z * slope_z);
+    for (const FieldRow& field : shape_rows()[shape.kind].fields()) {
+        if (field.range != "internal") continue;
+        const size_t at = size_t(field.offset);
+        if (field.name == "first") params[at] = float(grid_first[index]);
+        if (field.name == "columns") params[at] = float(grid.columns);
+        if (field.name == "rows") params[at] = float(grid.rows);
+        if (field.name == "step_x") params[at] = grid_steps[index].x;
+        if (field.name == "step_z") params[at] = grid_steps[index].y;
+    }
     return params;
 }
 
