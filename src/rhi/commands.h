@@ -22,18 +22,20 @@ class BarrierKey {
 };
 
 // Work touching the resource as `before` finishes, and its writes are visible, ahead of later work touching it as `after`.
-// Exactly one of buffer and texture. Rules (checked by the validate decorator):
-//  - a resource that was just made or written by write_buffer is settled: its first use needs no barrier (buffers), or one
-//    with before = Undefined (textures: the contents are lost) or before = the `after` of write_texture;
-//  - after a write, every further use needs a barrier, also the same kind of write; after reads, a write needs one;
-//  - before = every access since the last barrier, or a superset of it.
+// Exactly one of buffer and texture. The rules, which the validate decorator holds everyone to:
+//  - a buffer that was just made (outside a heap) or written by write_buffer is settled: its first use needs no barrier, nor
+//    do further reads. Everything else becomes usable by a barrier: with before = Undefined the old contents are lost;
+//  - after a barrier the resource may be used as `after` says and no other way: a write once, reads any number of times;
+//  - `before` of a buffer holds every access since its last barrier (or more); of a texture it is exactly that barrier's
+//    `after`, or `after` of the write_texture since, because the texture's layout follows from it. Accesses that
+//    before = Undefined would forget go to alias_before.
 struct Barrier {
     BufferHandle buffer = {};
     TextureHandle texture = {};
     Subresources range = {};  // textures
     Access before = Access::Undefined;
     Access after = Access::Undefined;
-    // Transients that share memory: accesses of the former owners to finish first. before is then Undefined.
+    // With before = Undefined: accesses to finish first, of the resource itself or of those that had its memory before.
     Access alias_before = Access::Undefined;
 };
 
