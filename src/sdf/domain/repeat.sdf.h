@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Repeat: a grid of copies centred on the origin. A point sees its two nearest copies an axis; that is exact because the child
-// must fit one spacing (copies cannot overlap) and cells are centred on the child's bounds, so a third copy is never nearer.
+// Repeat: a grid of copies centred on the origin.
+// A point sees its two nearest copies an axis; that is exact because the child must fit one spacing (copies cannot overlap) and cells are centred on the child's bounds, so a third copy is never nearer.
 
 struct Repeat {
     param3 spacing;  // = (1, 1, 1) m, >= 0: distance between copies along each axis, 0 for none

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Box frame: the twelve edges of a box as square beams; `half_extents` is its outer size. Exact outside: by symmetry the nearest
-// point lies in the octant of p, and there the solid is three boxes. (Quilez, "Distance functions", 2008.)
+// Box frame: the twelve edges of a box as square beams; `half_extents` is its outer size.
+// Exact outside: by symmetry the nearest point lies in the octant of p, and there the solid is three boxes.
+// (Quilez, "Distance functions", 2008.)
 
 struct BoxFrame {
     param3 half_extents;  // = (0.5, 0.5, 0.5) m, > 0: centre to each outer face

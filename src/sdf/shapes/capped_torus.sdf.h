@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Capped torus: an arc of a circle in the local xz-plane, centred on +X and reaching `half_angle` to both sides, thickened by
-// `minor_radius` (its ends are half balls). Exact outside, and inside for minor_radius <= major_radius.
+// Capped torus: an arc in the local xz-plane about +X, `half_angle` to both sides, thickened by `minor_radius`.
+// Its ends are half balls. Exact outside, and inside for minor_radius <= major_radius.
 
 struct CappedTorus {
     param major_radius;  // = 0.5 m, > 0: centre of the arc's circle to centre of the tube

@@ -14,9 +14,9 @@ KILN_SDF real sd_cut_sphere(real3 p, CutSphere s) {
     real round = size - s.radius;
     real flat_side = h - q.y;
     real inside = max(round, flat_side);
-    // Outside: below the flat disc; else where the way to the centre meets the kept part of the ball; else the rim is nearest.
+    // Outside: below the flat disc; else where the way to the centre enters the ball in its kept part; else the rim is nearest.
     real corner_d = length(real2(q.x - rim, q.y - h));
-    real beside = select(ge(q.y * s.radius, h * size), round, corner_d);
+    real beside = select(both(gt(round, 0.0f), ge(q.y * s.radius, h * size)), round, corner_d);
     real outside = select(both(gt(flat_side, 0.0f), lt(q.x, rim)), flat_side, beside);
     return select(gt(inside, 0.0f), outside, inside);
 }

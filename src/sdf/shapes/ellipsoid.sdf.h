@@ -21,14 +21,15 @@ KILN_SDF real sd_ellipsoid(real3 p, Ellipsoid s) {
     // On the planes of symmetry the nearest point is not unique: step off them by less than rounding.
     param off = low * KILN_C(1e-9);
     real3 q = max(abs(p) / unit, real3(off, off, off));
-    real tau = max(r.x * q.x - e.x, max(r.y * q.y - e.y, r.z * q.z - e.z));
-    for (int i = 0; i < 7; ++i) {
-        real3 k = real3(e.x + tau, e.y + tau, e.z + tau);
-        real3 v = r * q / k;
+    // Below the root: each axis alone, and all axes with the farthest pole.
+    real3 rq = r * q;
+    real tau = max(max(rq.x - e.x, length(rq) - max(e.x, max(e.y, e.z))), max(rq.y - e.y, rq.z - e.z));
+    for (int i = 0; i < 12; ++i) {
+        real3 k = real3(1.0f / (e.x + tau), 1.0f / (e.y + tau), 1.0f / (e.z + tau));
+        real3 v = rq * k;
         real3 vv = v * v;
         real n2 = vv.x + vv.y + vv.z;
-        real slope = vv.x / k.x + vv.y / k.y + vv.z / k.z;
-        tau = tau + (sqrt(n2) - 1.0f) * n2 / slope;
+        tau = tau + (sqrt(n2) - 1.0f) * n2 / dot(vv, k);
     }
     real3 w = q / real3(e.x + tau, e.y + tau, e.z + tau);
     real n = length(r * w);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Regular icosahedron with a vertex on +Y and one of that vertex's neighbours in the half plane of +X. Exact everywhere; folded
-// into one chamber as the tetrahedron is.
+// Regular icosahedron with a vertex on +Y and one of its neighbours in the half plane of +X.
+// Exact everywhere; folded into one chamber as the tetrahedron is.
 
 struct Icosahedron {
     param radius;  // = 0.5 m, > 0: centre to each vertex

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Chain link: a ring in the local xy-plane, cut in half and pulled apart along y. Exact for minor_radius <= major_radius, and
-// outside for any (Quilez, "Distance functions", 2008).
+// Chain link: a ring in the local xy-plane, cut in half and pulled apart along y.
+// Exact for minor_radius <= major_radius, and outside for any (Quilez, "Distance functions", 2008).
 
 struct Link {
     param half_length;   // = 0.3 m, >= 0: half the length of the straight part

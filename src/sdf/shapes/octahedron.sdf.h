@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Regular octahedron with its vertices on the axes. Exact everywhere; folded into one chamber as the tetrahedron is.
+// Regular octahedron with its vertices on the axes.
+// Exact everywhere; folded into one chamber as the tetrahedron is.
 
 struct Octahedron {
     param radius;  // = 0.5 m, > 0: centre to each vertex

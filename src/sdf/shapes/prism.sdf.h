@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Prism along y over a regular polygon whose first vertex is on +X. Exact everywhere: the point is turned to the side nearest to
-// it, where the polygon is a segment and its interior.
+// Prism along y over a regular polygon whose first vertex is on +X.
+// Exact everywhere: the point is turned to the side nearest to it, where the polygon is a segment and its interior.
 
 struct Prism {
     param sides;        // = 6 1, integer [3, 64]: number of sides

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Pyramid over a square: base at -half_height, apex at +half_height on the axis. Exact everywhere. By symmetry the nearest point
-// lies in the wedge x >= |z| of p; there the solid has the base, one slanted side and one edge of it.
+// Pyramid over a square: base at -half_height, apex at +half_height on the axis.
+// Exact everywhere. By symmetry the nearest point lies in the wedge x >= |z| of p; there the solid has the base, one slanted side
+// and one edge of it.
 
 struct Pyramid {
     param half_height;  // = 0.5 m, > 0: centre to base and apex

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Vesica: what two discs of one radius share, their centres `half_distance` to each side of the axis, turned about y; a lemon with
-// its tips on the axis. Exact everywhere (after the plane figure of Quilez, "2D distance functions", 2020).
+// Vesica: a lemon with its tips on the axis: what two discs share, their centres on both sides of the axis, turned about y.
+// Exact everywhere (after the plane figure of Quilez, "2D distance functions", 2020).
 
 struct Vesica {
     param radius;         // = 0.6 m, > 0: of both discs
