@@ -24,7 +24,7 @@ struct Cubic {
     float b0, b1, b2, b3;
 };
 
-// The cubic that the trilinear polynomial makes along the segment from p (at 0) to q (at 1), both in [0, 1]³.
+// The cubic that the trilinear polynomial makes along the segment from p (at 0) to q (at 1).
 KILN_FN Cubic cubic_along(Corners c, vec3 p, vec3 q) {
     Cubic cubic;
     cubic.b0 = trilinear_value(c, p);
@@ -54,7 +54,7 @@ KILN_FN float cubic_bracketed(Cubic c, float lo, float hi, float value_lo, float
         if (value > 0.0f) lo = s; else hi = s;
         float slope = cubic_slope(c, s);
         float next = slope < 0.0f ? s - value / slope : lo;
-        if (!(next > lo && next < hi)) next = 0.5f * (lo + hi);
+        if (!(next >= lo && next <= hi)) next = 0.5f * (lo + hi);
         float moved = abs(next - s);
         s = next;
         if (moved < 1e-6f) break;
@@ -113,10 +113,10 @@ KILN_FN TexelRay texel_ray(ivec3 whole, vec3 part, vec3 direction) {
 }
 
 // The same ray seen from texel (0, 0, 0) of one brick, with its parameter counted from near the brick, so that floats
-// suffice at any distance: point(t) = (high + low) + direction * (t - t_base). A pure function of ray and brick.
+// suffice at any distance: point(t) = (high + low) + (lead + rest) * (t - t_base). A pure function of ray and brick.
 struct BrickRay {
     vec3 high, low;
-    vec3 direction;
+    vec3 lead, rest;  // direction: its first 12 bits, and what is left
     vec3 inverse;
     float t_base;
 };
@@ -144,7 +144,8 @@ KILN_FN BrickRay brick_ray(TexelRay ray, ivec3 texel) {
                    (3.5f - ray.part.z - float(away.z)) * d.z;
     BrickRay local;
     local.t_base = leading_bits(middle);
-    local.direction = d;
+    local.lead = vec3(leading_bits(d.x), leading_bits(d.y), leading_bits(d.z));
+    local.rest = d - local.lead;
     local.inverse = ray.inverse;
     rebased(away.x, ray.part.x, d.x, local.t_base, local.high.x, local.low.x);
     rebased(away.y, ray.part.y, d.y, local.t_base, local.high.y, local.low.y);
@@ -157,16 +158,31 @@ KILN_FN float plane_crossing(float plane, float high, float low, float inverse, 
     return inverse == 0.0f ? parallel : ((plane - high) - low) * inverse;
 }
 
-// One coordinate of the point at s (from t_base), counted from voxel boundary `from`, clamped to that voxel.
-KILN_FN float voxel_coordinate(float from, float high, float low, float direction, float s) {
-    return min(max(((high - from) + low) + direction * s, 0.0f), 1.0f);
+// One coordinate of the point at s (from t_base), counted from `from`. The large terms are exact products and differences, so
+// the error is that of a number near 1 (1e-7), however far s is: a grazing ray multiplies it by hundreds.
+KILN_FN float ray_coordinate(float from, float high, float low, float lead, float rest, float s) {
+    float c = leading_bits(s);
+    KILN_PRECISE float large = (high - from) + lead * c;
+    KILN_PRECISE float small = low + (rest * c + (lead + rest) * (s - c));
+    return large + small;
 }
 
-// Position in `voxel` at s, in [0, 1]³.
+// Position in `voxel` at s: in [0, 1]³, or kFaceOverlap outside. Not clamped to the faces: that would bend the ray.
 KILN_FN vec3 voxel_point(BrickRay ray, ivec3 voxel, float s) {
-    return vec3(voxel_coordinate(float(voxel.x), ray.high.x, ray.low.x, ray.direction.x, s),
-                voxel_coordinate(float(voxel.y), ray.high.y, ray.low.y, ray.direction.y, s),
-                voxel_coordinate(float(voxel.z), ray.high.z, ray.low.z, ray.direction.z, s));
+    float x = ray_coordinate(float(voxel.x), ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, s);
+    float y = ray_coordinate(float(voxel.y), ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, s);
+    float z = ray_coordinate(float(voxel.z), ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, s);
+    float low = -kFaceOverlap;
+    float high = 1.0f + kFaceOverlap;
+    return vec3(min(max(x, low), high), min(max(y, low), high), min(max(z, low), high));
+}
+
+// Voxel of the brick, 0 … 6, that holds the point at s or is next to it.
+KILN_FN ivec3 voxel_at(BrickRay ray, float s) {
+    float x = ray_coordinate(0.0f, ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, s);
+    float y = ray_coordinate(0.0f, ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, s);
+    float z = ray_coordinate(0.0f, ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, s);
+    return ivec3(int(min(max(x, 0.0f), 6.5f)), int(min(max(y, 0.0f), 6.5f)), int(min(max(z, 0.0f), 6.5f)));
 }
 
 // What field_march() of march.gpu.h answers.

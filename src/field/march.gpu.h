@@ -14,9 +14,9 @@ KILN_FN float voxel_exit_plane(int v, bool up) {
 
 // Voxels of one brick between t_min and t_max (voxels along the ray). True when hit; then t, voxel and p are set.
 KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_INOUT(MarchHit) hit) {
-    bool up_x = ray.direction.x > 0.0f;
-    bool up_y = ray.direction.y > 0.0f;
-    bool up_z = ray.direction.z > 0.0f;
+    bool up_x = ray.inverse.x > 0.0f;
+    bool up_y = ray.inverse.y > 0.0f;
+    bool up_z = ray.inverse.z > 0.0f;
     // Neighbouring bricks round the crossing of their common face apart: each looks a little past it, so none leaves a gap.
     float first = -kFaceOverlap;
     float last = float(kBrickVoxels) + kFaceOverlap;
@@ -29,10 +29,7 @@ KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_
     leave = min(leave, plane_crossing(up_y ? last : first, ray.high.y, ray.low.y, ray.inverse.y, kFarVoxels));
     leave = min(leave, plane_crossing(up_z ? last : first, ray.high.z, ray.low.z, ray.inverse.z, kFarVoxels));
     if (enter > leave) return false;
-    ivec3 voxel;
-    voxel.x = int(floor(min(max((ray.high.x + ray.low.x) + ray.direction.x * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
-    voxel.y = int(floor(min(max((ray.high.y + ray.low.y) + ray.direction.y * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
-    voxel.z = int(floor(min(max((ray.high.z + ray.low.z) + ray.direction.z * enter, 0.0f), float(kBrickVoxels) - 0.5f)));
+    ivec3 voxel = voxel_at(ray, enter);
     for (int i = 0; i < 3 * kBrickVoxels + 3; i++) {
         float out_x = plane_crossing(voxel_exit_plane(voxel.x, up_x), ray.high.x, ray.low.x, ray.inverse.x, kFarVoxels);
         float out_y = plane_crossing(voxel_exit_plane(voxel.y, up_y), ray.high.y, ray.low.y, ray.inverse.y, kFarVoxels);
@@ -46,7 +43,8 @@ KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_
             float s = enter + root * (exit - enter);
             hit.t = ray.t_base + s;
             hit.voxel = voxel;
-            hit.p = voxel_point(ray, voxel, s);
+            vec3 p = voxel_point(ray, voxel, s);
+            hit.p = vec3(min(max(p.x, 0.0f), 1.0f), min(max(p.y, 0.0f), 1.0f), min(max(p.z, 0.0f), 1.0f));
             return true;
         }
         if (out_any >= leave) return false;
@@ -80,9 +78,9 @@ KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t
     hit.p = vec3(0.0f, 0.0f, 0.0f);
     hit.cells = 0;
     hit.voxels = 0;
-    bool up_x = ray.direction.x > 0.0f;
-    bool up_y = ray.direction.y > 0.0f;
-    bool up_z = ray.direction.z > 0.0f;
+    bool up_x = ray.inverse.x > 0.0f;
+    bool up_y = ray.inverse.y > 0.0f;
+    bool up_z = ray.inverse.z > 0.0f;
     // From here on, texels and cells count from the grid's first.
     ivec3 whole = ivec3(ray.whole.x - grid.cell_x * kBrickVoxels, ray.whole.y - grid.cell_y * kBrickVoxels,
                         ray.whole.z - grid.cell_z * kBrickVoxels);
