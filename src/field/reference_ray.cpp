@@ -173,7 +173,7 @@ ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double
             const std::array<double, 4> cuts = cut(voxel, line, a, b, count);
             for (int i = 0; i < count; ++i) {
                 const double value = voxel.at(line.at(cuts[size_t(i)]));
-                follow(value);
+                if (i > 0 || last > 1e29) follow(value);  // a voxel starts with the value that the one before ended with
                 if (hit.state == kMarchMiss && value <= 0) {
                     hit.state = kMarchHit;
                     hit.t = i == 0 ? cuts[0] : bisect(voxel, line, cuts[size_t(i - 1)], cuts[size_t(i)]);

@@ -1,0 +1,138 @@
+// SPDX-License-Identifier: MIT
+// Small worlds for the field's tests, and what every test does with one.
+#pragma once
+
+#include "field/field.h"
+#include "field/host_bricks.h"
+#include "sdf/judge.h"
+#include "sdf/program.h"
+
+#include <kiln/shapes.h>
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace kiln::field::worlds {
+
+inline std::shared_ptr<const sdf::Program> compiled(const std::vector<Edit>& edits) {
+    auto program = sdf::compile({edits, {}, {}});
+    EXPECT_TRUE(program) << (program ? "" : program.error().message);
+    return std::make_shared<const sdf::Program>(program ? std::move(*program) : sdf::Program{});
+}
+
+inline Edit edit(Shape shape, vec3 position = {}, Op op = Op::Union, float blend = 0) {
+    Edit e;
+    e.node.shape = std::move(shape);
+    e.node.transform.position = position;
+    e.op = op;
+    e.blend_radius = blend;
+    return e;
+}
+
+inline Edit of_material(Edit e, uint32_t index) {
+    e.node.material = MaterialId{index, 0};
+    return e;
+}
+
+struct World {
+    std::string name;
+    std::vector<Edit> edits;
+    FieldOptions options;
+
+    std::shared_ptr<const Field> field() const {
+        auto made = Field::build(compiled(edits), options);
+        EXPECT_TRUE(made) << (made ? "" : made.error().message);
+        return made ? *made : nullptr;
+    }
+};
+
+class Random {
+public:
+    explicit Random(uint32_t seed) : engine_(seed) {}
+    float in(float lo, float hi) { return std::uniform_real_distribution<float>(lo, hi)(engine_); }
+    int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(engine_); }
+    vec3 point(float size) { return {in(-size, size), in(-size, size), in(-size, size)}; }
+    vec3 direction() {
+        while (true) {
+            const vec3 v = point(1);
+            const float size = length(v);
+            if (size > 0.1f && size < 1) return v / size;
+        }
+    }
+    uint32_t bits() { return uint32_t(engine_()); }
+
+    Edit edit(float spread) {
+        Edit e;
+        switch (below(5)) {
+            case 0: e.node.shape = Sphere{.radius = in(0.1f, 0.4f)}; break;
+            case 1: e.node.shape = Box{.half_extents = {in(0.05f, 0.4f), in(0.05f, 0.4f), in(0.05f, 0.4f)}}; break;
+            case 2: e.node.shape = Torus{.major_radius = in(0.2f, 0.4f), .minor_radius = in(0.04f, 0.12f)}; break;
+            case 3: e.node.shape = RoundedBox{.half_extents = {0.3f, 0.2f, 0.25f}, .rounding = in(0.01f, 0.15f)}; break;
+            default: e.node.shape = Capsule{.half_height = in(0, 0.4f), .radius = in(0.05f, 0.2f)}; break;
+        }
+        e.node.transform.position = point(spread);
+        e.node.transform.rotation = axis_angle(direction(), in(-3, 3));
+        if (below(3) == 0) e.node.transform.scale = {in(0.5f, 2), in(0.5f, 2), in(0.5f, 2)};
+        if (below(4) == 0) e.node.domain.push_back(Twist{.rate = in(-3, 3)});
+        if (below(4) == 0) e.node.domain.push_back(Round{.radius = in(0, 0.05f)});
+        e.op = below(10) < 6 ? Op::Union : (below(4) != 0 ? Op::Subtract : Op::Paint);
+        if (below(2) == 0) e.blend_radius = in(0.01f, 0.2f);
+        e.node.material = MaterialId{uint32_t(below(6)), 0};
+        return e;
+    }
+
+private:
+    std::mt19937 engine_;
+};
+
+inline World sphere_of(float radius_voxels, vec3 center_voxels = {0.3f, -0.2f, 0.4f}, float h = 0.05f) {
+    const float size = (radius_voxels + 8) * h;
+    return {"sphere", {edit(Sphere{.radius = radius_voxels * h}, center_voxels * h)}, {.voxel_size = h, .bounds = {{-size, -size, -size}, {size, size, size}}}};
+}
+
+/// About 40 edits in 2 m: unions, cuts, blends, warps, scales, paints.
+inline World jumble(uint32_t seed = 7, int count = 40) {
+    World w{"jumble", {}, {.voxel_size = 0.04f, .bounds = {{-1.6f, -1.5f, -1.7f}, {1.5f, 1.6f, 1.5f}}}};
+    Random r(seed);
+    for (int i = 0; i < count; ++i) w.edits.push_back(r.edit(1.0f));
+    return w;
+}
+
+/// Sheets half a voxel thick, at an offset from the lattice.
+inline World thin_walls() {
+    World w{"thin walls", {}, {.voxel_size = 0.04f, .bounds = {{-0.9f, -0.9f, -0.9f}, {0.9f, 0.9f, 0.9f}}}};
+    w.edits.push_back(edit(Box{.half_extents = {0.01f, 0.6f, 0.6f}}, {0.02f, 0, 0}));
+    w.edits.push_back(edit(Box{.half_extents = {0.6f, 0.01f, 0.6f}}, {0, -0.013f, 0}));
+    Edit tilted = edit(Box{.half_extents = {0.5f, 0.5f, 0.008f}}, {0.1f, 0.05f, 0.3f});
+    tilted.node.transform.rotation = axis_angle(normalize(vec3{1, 2, 0.3f}), 0.4f);
+    w.edits.push_back(tilted);
+    return w;
+}
+
+inline World boxes() {
+    World w{"boxes", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}}};
+    w.edits.push_back(edit(Box{.half_extents = {0.7f, 0.35f, 0.5f}}));  // faces on texels and on cell faces (0.35 = 7 voxels)
+    w.edits.push_back(edit(Box{.half_extents = {0.2f, 0.9f, 0.2f}}, {0.1f, 0, 0}, Op::Subtract));
+    Edit turned = edit(Box{.half_extents = {0.4f, 0.4f, 0.4f}}, {-0.6f, 0.5f, 0.2f});
+    turned.node.transform.rotation = axis_angle(normalize(vec3{1, 1, 0}), 0.7f);
+    w.edits.push_back(turned);
+    return w;
+}
+
+inline World blends() {
+    World w{"blends", {}, {.voxel_size = 0.04f, .bounds = {{-1.4f, -1.4f, -1.4f}, {1.4f, 1.4f, 1.4f}}}};
+    w.edits.push_back(of_material(edit(Sphere{.radius = 0.5f}, {-0.3f, 0, 0}), 1));
+    w.edits.push_back(of_material(edit(Sphere{.radius = 0.4f}, {0.4f, 0.1f, 0}, Op::Union, 0.3f), 2));
+    w.edits.push_back(of_material(edit(Torus{.major_radius = 0.6f, .minor_radius = 0.12f}, {0, 0.2f, 0.1f}, Op::Union, 0.1f), 3));
+    w.edits.push_back(of_material(edit(Sphere{.radius = 0.35f}, {0, 0.5f, 0.3f}, Op::Subtract, 0.15f), 4));
+    return w;
+}
+
+inline std::vector<World> all() { return {sphere_of(10), boxes(), blends(), thin_walls(), jumble(7), jumble(11, 60)}; }
+
+}  // namespace kiln::field::worlds
