@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: MIT
+
+#include "render/lib/shadow_march.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+using namespace kiln::render::shade;
+using kiln::vec3;
+
+namespace {
+
+constexpr float kLightHeight = 5, kLightRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
+
+float box_distance(vec3 p, vec3 lo, vec3 hi) {
+    const vec3 q{std::fabs(p.x - 0.5f * (lo.x + hi.x)) - 0.5f * (hi.x - lo.x), std::fabs(p.y - 0.5f * (lo.y + hi.y)) - 0.5f * (hi.y - lo.y),
+                 std::fabs(p.z - 0.5f * (lo.z + hi.z)) - 0.5f * (hi.z - lo.z)};
+    return length(max(q, vec3{0, 0, 0})) + std::min(std::max(q.x, std::max(q.y, q.z)), 0.0f);
+}
+
+// A plate over x < 0 at height h, `thickness` upwards, over the ground.
+auto half_plane(float h, float thickness) {
+    return [=](vec3 p) { return std::min(p.y, box_distance(p, {-1000, h, -1000}, {0, h + thickness, 1000})); };
+}
+
+// A block over x < 0 whose edge is at height h and whose side leans away from the light at 45 degrees, over the ground.
+auto leaning_block(float h) {
+    return [=](vec3 p) {
+        const float x = p.x, y = p.y - h;
+        const float bottom = x < 0 ? std::fabs(y) : std::hypot(x, y);
+        const float along = std::max(0.0f, (y - x) * std::numbers::sqrt2_v<float> / 2);  // on the side, from the edge
+        const float side = std::hypot(x + along * std::numbers::sqrt2_v<float> / 2, y - along * std::numbers::sqrt2_v<float> / 2);
+        const float d = std::min(bottom, side);
+        return std::min(p.y, y > 0 && x + y < 0 ? -d : d);
+    };
+}
+
+// Visible fraction from (x, 0, 0) of the disc around (0, kLightHeight, 0), as the renderer asks for it.
+template <typename Field>
+float visible_from(const Field& field, float x) {
+    const vec3 to_light{-x, kLightHeight, 0};
+    const float distance = length(to_light);
+    SoftShadow shadow{field};
+    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance, {1e-3f, distance, 1e-4f, 256});
+}
+
+// Where along x the fraction is f.
+template <typename Field>
+double place_of(const Field& field, float f, float reach) {
+    float lo = -reach, hi = reach;
+    for (int i = 0; i < 40; ++i) {
+        const float mid = 0.5f * (lo + hi);
+        (visible_from(field, mid) < f ? lo : hi) = mid;
+    }
+    return 0.5 * (lo + hi);
+}
+
+}  // namespace
+
+// Gate G14: offsets of the edge across the disc, in its radii. Thin plates and thick blocks hide alike.
+TEST(SoftShadow, HalfPlaneHidesItsShareOfTheDisc) {
+    const double expected[][2] = {{-0.5, 0.19550}, {-0.25, 0.34252}, {0, 0.5}, {0.25, 0.65748}, {0.5, 0.80450}};
+    for (const auto& [offset, visible] : expected) {
+        EXPECT_NEAR(SoftShadow{leaning_block(1)}.disc_visible(float(offset)), visible, 1e-5);
+        for (const float h : {0.5f, 1.0f, 2.5f}) {
+            // The ray to the light's centre passes the edge's height at x (1 - h/D); a disc radius is R h / D there.
+            const float x = float(offset) * kLightRadius * h / (kLightHeight - h);
+            EXPECT_NEAR(visible_from(leaning_block(h), x), visible, 0.02) << "block, edge at " << offset << ", height " << h;
+            for (const float thickness : {0.02f, 0.005f}) {
+                EXPECT_NEAR(visible_from(half_plane(h, thickness), x), visible, 0.02)
+                    << "plate of " << thickness << " m, edge at " << offset << ", height " << h;
+            }
+        }
+    }
+}
+
+TEST(SoftShadow, PenumbraIsAsWideAsTheLightMakesIt) {
+    // The fraction runs from 0 to 1 over 2 R h / (D - h); 5 % and 95 % are at x = -+0.8052 radii of it.
+    double lo = 0, hi = 1;
+    for (int i = 0; i < 60; ++i) {
+        const double mid = 0.5 * (lo + hi);
+        (0.5 + (mid * std::sqrt(1 - mid * mid) + std::asin(mid)) / std::numbers::pi < 0.95 ? lo : hi) = mid;
+    }
+    for (const float h : {1.0f, 2.5f}) {
+        const double whole = 2 * kLightRadius * h / (kLightHeight - h);
+        const auto field = leaning_block(h);
+        const double width = (place_of(field, 0.95f, float(whole)) - place_of(field, 0.05f, float(whole))) / lo;
+        EXPECT_NEAR(width, whole, 0.05 * whole) << "edge at height " << h;
+    }
+}
+
+TEST(SoftShadow, ThinWallsHideEverythingBehindThem) {
+    for (const float thickness : {0.1f, 0.02f, 0.005f}) {
+        for (const float tilt_deg : {0.0f, 20.0f, 45.0f, 70.0f}) {
+            const float a = tilt_deg * std::numbers::pi_v<float> / 180;
+            const vec3 n{std::sin(a), std::cos(a), 0};
+            const auto wall = [=](vec3 p) { return std::min(p.y, std::fabs(dot(n, p - vec3{0, 2, 0})) - 0.5f * thickness); };
+            for (float x = -0.4f; x <= 0.4f; x += 0.037f) {
+                EXPECT_LE(visible_from(wall, x), 0.01f) << thickness << " m thick, tilted by " << tilt_deg << ", at " << x;
+            }
+        }
+    }
+}
+
+TEST(SoftShadow, UnoccludedPlaneDoesNotShadowItself) {
+    const auto plane = [](vec3 p) { return p.y; };
+    for (float degrees = 0; degrees <= 89; degrees += 0.5f) {
+        const float a = degrees * std::numbers::pi_v<float> / 180;
+        for (const float tan_radius : {0.0f, 0.0046f, 0.0087f}) {
+            const float offset = 0.01f;  // the start is one voxel off the surface
+            SoftShadow shadow{plane};
+            const float seen = shadow.shadow_visible({0, offset, 0}, {std::sin(a), std::cos(a), 0}, tan_radius, {offset, 100, 1e-4f, 256});
+            EXPECT_GE(seen, 0.99f) << degrees << " degrees, disc " << tan_radius;
+        }
+    }
+}
+
+// Hard shadows are discs of no size: 1 or 0, and the edge is where the ray to the light's centre passes it.
+TEST(SoftShadow, HardShadowEndsAtTheProjectedEdge) {
+    const auto field = half_plane(1, 0.02f);
+    for (float x = -0.5f; x <= 0.5f; x += 0.01f) {
+        if (std::fabs(x) < 0.004f) continue;
+        const vec3 to_light{-x, kLightHeight, 0};
+        SoftShadow shadow{field};
+        const float seen = shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, 256});
+        EXPECT_EQ(seen, x > 0 ? 1.0f : 0.0f) << x;
+    }
+}
+
+TEST(SoftShadow, VisibilityGrowsTowardsTheLight) {
+    for (const float thickness : {0.02f, 0.3f, 3.0f}) {
+        float before = 0;
+        for (float x = -0.2f; x <= 3; x += 0.002f) {
+            const float now = visible_from(half_plane(1, thickness), x);
+            EXPECT_GE(now, before - 0.03f) << x << " under a plate of " << thickness;
+            before = now;
+        }
+        EXPECT_EQ(before, 1.0f);
+    }
+}
+
+// A strip hides what is between its edges: seen from below, 0.04 m at height 2 are +-0.05 radii of the disc.
+TEST(SoftShadow, AWireHidesAStrip) {
+    const float h = 2, half_width = 0.02f;
+    const auto wire = [=](vec3 p) { return std::min(p.y, box_distance(p, {-half_width, h, -100}, {half_width, h + 0.002f, 100})); };
+    SoftShadow shadow{wire};
+    for (float x = -0.5f; x <= 0.5f; x += 0.01f) {
+        const float middle = x * (1 - h / kLightHeight), cone = kLightRadius * h / kLightHeight;
+        const double hidden = shadow.disc_visible((middle + half_width) / cone) - shadow.disc_visible((middle - half_width) / cone);
+        EXPECT_NEAR(visible_from(wire, x), 1 - hidden, 0.02) << x;
+    }
+}
+
+TEST(SoftShadow, PartsOfADiscMakeUpTheDisc) {
+    // A corner: neither straight edge alone. Two quarter planes at height 2 leave a quarter of the disc.
+    const auto corner = [](vec3 p) {
+        return std::min({p.y, box_distance(p, {-100, 2, -100}, {0, 2.002f, 100}), box_distance(p, {-100, 2, -100}, {100, 2.002f, 0})});
+    };
+    const int parts = 64;
+    float seen = 0;
+    SoftShadow shadow{corner};
+    for (int i = 0; i < parts; ++i) {
+        const kiln::vec2 at = shadow.shadow_sub_disc(i, parts, 0.3f);
+        const vec3 l = shadow.shadow_direction({0, 1, 0}, kLightRadius / kLightHeight, at);
+        const float tan_radius = kLightRadius / kLightHeight / std::sqrt(float(parts));
+        seen += shadow.shadow_visible({0, 0, 0}, l, tan_radius, {1e-3f, kLightHeight, 1e-4f, 256}) / parts;
+    }
+    EXPECT_NEAR(seen, 0.25, 0.02);
+}
