@@ -193,7 +193,7 @@ struct DrawCall {
 
 struct GraphResource {
     enum class Origin : uint8_t { Transient, Imported, History, Upload, Readback };
-    std::string name;
+    std::string name = {};
     bool is_image = false;
     Origin origin = Origin::Transient;
     rhi::Extent size = {};
@@ -202,9 +202,10 @@ struct GraphResource {
     uint32_t mips = 1;
     uint64_t bytes = 0;  // buffers
     uint32_t version = 0;
-    std::vector<rhi::Access> entry;  // one a subresource, as it is when the frame begins; empty: all Undefined
+    std::vector<rhi::Access> entry = {};  // one a subresource, as it is when the frame begins; empty: all Undefined
     rhi::Access leave = rhi::Access::Undefined;  // access to leave it in; Undefined: any
     bool output = false;
+    std::string history = {};  // the runner's name of it
     bool history_current = false;
     rhi::TextureHandle texture = {};   // imported
     rhi::BufferHandle buffer = {};     // imported
@@ -235,25 +236,25 @@ struct BoundUse {
 
 struct DispatchCommand {
     const Kernel* kernel = nullptr;
-    std::vector<BoundUse> bindings;
-    std::vector<std::byte> push;
+    std::vector<BoundUse> bindings = {};
+    std::vector<std::byte> push = {};
     std::array<uint32_t, 3> groups{1, 1, 1};
     uint32_t indirect = ~0u;  // resource with the group counts
     uint64_t indirect_offset = 0;
 };
 struct DrawCommand {
     const RasterKernel* kernel = nullptr;
-    std::vector<BoundUse> bindings;
-    std::vector<std::byte> push;
-    Targets targets;  // image pointers are not valid any more: see the ids
-    std::vector<uint32_t> color_ids;
+    std::vector<BoundUse> bindings = {};
+    std::vector<std::byte> push = {};
+    Targets targets = {};  // image pointers are not valid any more: see the ids
+    std::vector<uint32_t> color_ids = {};
     uint32_t depth_id = ~0u;
-    std::vector<DrawCall> draws;
+    std::vector<DrawCall> draws = {};
 };
 struct CopyCommand {
     uint32_t src = 0, dst = 0;                          // resources
     uint64_t src_offset = 0, dst_offset = 0, size = 0;  // buffer to buffer
-    std::vector<CopyRegion> regions;                    // the others
+    std::vector<CopyRegion> regions = {};               // the others
 };
 struct ClearCommand {
     uint32_t resource = 0;
@@ -264,9 +265,10 @@ struct ClearCommand {
 };
 
 struct GraphPass {
-    std::string name;
-    std::vector<GraphAccess> accesses;  // at most one a subresource once normalised; reads of one subresource are or-ed
-    std::variant<DispatchCommand, DrawCommand, CopyCommand, ClearCommand> command;
+    std::string name = {};
+    std::vector<GraphAccess> accesses =
+        {};  // at most one a subresource once normalised; reads of one subresource are or-ed
+    std::variant<DispatchCommand, DrawCommand, CopyCommand, ClearCommand> command = {};
     bool keep = false;
 };
 
@@ -390,15 +392,22 @@ private:
     bool current(const Buffer& buffer, const char* verb);
     bool bump(Image& image, const char* verb);
     bool bump(Buffer& buffer, const char* verb);
-    bool check_region(const std::string& name, const GraphResource& image, const CopyRegion& region, bool source);
+    // The subresources that regions touch on the image's side, declared with `access`.
+    bool touch_regions(GraphPass& pass, uint32_t image, std::span<const CopyRegion> regions, bool source,
+                       rhi::Access access);
+    bool check_buffer_side(const GraphPass& pass, const GraphResource& image, const GraphResource& buffer,
+                           std::span<const CopyRegion> regions);
+    template <typename T>
+    bool known(const T& handle, bool is_image, const char* verb);
     Image image_of(uint32_t id) const;
     Buffer buffer_of(uint32_t id) const;
     uint32_t add_resource(GraphResource resource);
     void error(std::string sentence);
-    // The only barriers of the program (besides those tests of rhi make).
+    // The only barriers of the program (besides those tests of rhi make). For the runner.
     static void emit(rhi::CommandEncoder& encoder, std::span<const rhi::Barrier> barriers);
 
     Runner* runner_ = nullptr;
+    uint64_t begun_after_ = 0;  // frames the runner had executed
     std::unique_ptr<Reflections> own_reflections_;
     Reflections* reflections_;
     std::vector<GraphResource> resources_;

@@ -73,7 +73,6 @@ public:
 private:
     struct Compute {
         const uint32_t* words;  // identifies the kernel that owns the name
-        std::vector<uint32_t> replaced = {};
         rhi::ComputePipeline pipeline = {};
     };
     struct Raster {

@@ -23,8 +23,8 @@ struct PlanBarrier {
 };
 
 struct PlanLevel {
-    std::vector<PlanBarrier> barriers;  // ahead of the passes; by resource, then range
-    std::vector<uint32_t> passes;       // indices into Plan::passes
+    std::vector<PlanBarrier> barriers = {};  // ahead of the passes; by resource, then range
+    std::vector<uint32_t> passes = {};       // indices into Plan::passes
 };
 
 // A transient's place in the shared memory.
@@ -32,6 +32,7 @@ struct Placement {
     uint32_t resource = 0;
     uint64_t offset = 0;
     uint64_t size = 0;
+    uint64_t alignment = 1;
     uint32_t first_level = 0;                          // it holds the memory from this level …
     uint32_t last_level = 0;                           // … to this one, both included
     rhi::Access last_access = rhi::Access::Undefined;  // to be waited for by the next owner
@@ -49,22 +50,24 @@ struct PlanResource {
     bool used = false;  // by a pass that was not culled
     rhi::TextureUsage texture_usage = rhi::TextureUsage::None;
     rhi::BufferUsage buffer_usage = rhi::BufferUsage::None;
-    std::vector<rhi::Access> leave;  // one a subresource: the access it is in after the frame; used resources
+    std::vector<rhi::Access> leave = {};  // one a subresource: the access it is in after the frame; used resources
     bool written = false;
 };
 
 struct Plan {
-    std::vector<GraphResource> resources;  // copies without payloads, for text() and checks
-    std::vector<GraphPass> passes;         // those that run, in order, including inserted ones
-    std::vector<std::string> culled;       // names, in order of recording
-    std::vector<PlanLevel> levels;
-    std::vector<PlanBarrier> epilogue;  // after the last level: outputs and read-backs into the access they are left in
-    std::vector<PlanResource> uses;     // one a resource
-    std::vector<Placement> placements;  // by resource
-    uint64_t peak_bytes = 0;            // size of the shared memory
-    uint64_t unaliased_bytes = 0;       // what the transients would need one beside the other
+    std::vector<GraphResource> resources = {};  // copies without payloads, for text() and checks
+    std::vector<GraphPass> passes = {};         // those that run, in order, including inserted ones
+    std::vector<std::string> culled = {};       // names, in order of recording
+    std::vector<PlanLevel> levels = {};
+    std::vector<PlanBarrier> epilogue =
+        {};  // after the last level: outputs and read-backs into the access they are left in
+    std::vector<PlanResource> uses = {};     // one a resource
+    std::vector<Placement> placements = {};  // by resource
+    uint64_t peak_bytes = 0;                 // size of the shared memory
+    uint64_t unaliased_bytes = 0;            // what the transients would need one beside the other
     bool aliasing = true;
-    std::vector<MemoryTail> tail;  // for the next frame's CompileOptions
+    std::vector<MemoryTail> tail_before = {};  // CompileOptions::tail
+    std::vector<MemoryTail> tail = {};         // for the next frame's CompileOptions
 
     size_t barrier_count() const;
     std::string text() const;
@@ -78,6 +81,9 @@ struct CompileOptions {
     std::function<rhi::MemoryNeed(const rhi::TextureDesc&)> texture_need = {};
     std::function<rhi::MemoryNeed(const rhi::BufferDesc&)> buffer_need = {};
 };
+
+// The same kind, size and format.
+bool same_shape(const GraphResource& a, const GraphResource& b);
 
 // What a transient is made with.
 rhi::TextureDesc texture_desc(const GraphResource& resource, rhi::TextureUsage usage);

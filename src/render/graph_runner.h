@@ -21,8 +21,8 @@ struct PassTime {
 
 struct FrameTimes {
     rhi::SubmitId submit = 0;
-    std::vector<PassTime> passes;  // in order of execution
-    double total_ms = 0;           // first start to last end
+    std::vector<PassTime> passes = {};  // in order of execution
+    double total_ms = 0;                // first start to last end
 };
 
 struct RunnerStats {
@@ -45,7 +45,8 @@ public:
     rhi::Device& device();
     RunnerOptions& options();
 
-    // Compiles, records and submits. The graph is used up.
+    // Compiles, records and submits. The graph is used up. One graph at a time: it must have been begun after the last
+    // execute(), because it took over the state that one left.
     Result<rhi::SubmitId> execute(Graph& graph);
 
     // After execute(): an output of that graph, until the next execute().
@@ -68,8 +69,14 @@ public:
 
 private:
     friend class Graph;
-    friend struct ReadbackState;
-    friend class Readback;
+    // What a graph takes over when it is recorded.
+    Reflections& reflections();
+    // The accesses an imported resource was left in; empty if no graph had it yet.
+    std::vector<rhi::Access> left_in(rhi::TextureHandle texture) const;
+    std::vector<rhi::Access> left_in(rhi::BufferHandle buffer) const;
+    // Of the two images or buffers of a history, if there are such; false if the previous one holds no frame.
+    bool history_left_in(const std::string& name, const GraphResource& like, std::vector<rhi::Access>& previous,
+                         std::vector<rhi::Access>& current) const;
     struct Impl;
     std::unique_ptr<Impl> impl_;
 };

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MIT
+#include "render/graph_kernel.h"
+
+#include "base/log.h"
+
+#include <algorithm>
+
+namespace kiln::render {
+
+namespace {
+
+// The bindings of both stages in one list; a binding that both declare is there once.
+void fold(rhi::Reflection& into, const rhi::Reflection& from) {
+    into.push_bytes = std::max(into.push_bytes, from.push_bytes);
+    if (into.push_members.empty()) into.push_members = from.push_members;
+    for (const rhi::ReflectedBinding& b : from.bindings) {
+        const auto same = std::find_if(into.bindings.begin(), into.bindings.end(), [&](const rhi::ReflectedBinding& o) {
+            return o.set == b.set && o.binding == b.binding;
+        });
+        if (same == into.bindings.end()) {
+            into.bindings.push_back(b);
+        } else {
+            same->stages |= b.stages;
+            same->write_only = same->write_only && b.write_only;
+        }
+    }
+    std::sort(into.bindings.begin(), into.bindings.end(),
+              [](const rhi::ReflectedBinding& a, const rhi::ReflectedBinding& b) {
+                  return std::pair(a.set, a.binding) < std::pair(b.set, b.binding);
+              });
+}
+
+// Empty, or what the second reflection has differently.
+std::string interface_difference(const rhi::Reflection& was, const rhi::Reflection& is) {
+    if (was.workgroup != is.workgroup)
+        return formatted("workgroup {}x{}x{} was {}x{}x{}", is.workgroup[0], is.workgroup[1], is.workgroup[2],
+                         was.workgroup[0], was.workgroup[1], was.workgroup[2]);
+    if (was.push_bytes != is.push_bytes) return formatted("push data of {} B was {} B", is.push_bytes, was.push_bytes);
+    if (was.bindings.size() != is.bindings.size())
+        return formatted("{} bindings were {}", is.bindings.size(), was.bindings.size());
+    for (size_t i = 0; i < is.bindings.size(); ++i) {
+        const rhi::ReflectedBinding &a = was.bindings[i], &b = is.bindings[i];
+        if (a.set != b.set || a.binding != b.binding || a.kind != b.kind || a.format != b.format ||
+            a.dimension != b.dimension || a.write_only != b.write_only || a.block_size != b.block_size ||
+            a.sample_type != b.sample_type)
+            return formatted("binding {}.{} '{}' ({}) was {}.{} '{}' ({})", b.set, b.binding, b.name, rhi::name(b.kind),
+                             a.set, a.binding, a.name, rhi::name(a.kind));
+    }
+    return {};
+}
+
+}  // namespace
+
+const rhi::Reflection* Reflections::of(const Kernel& kernel, std::string& error) {
+    const auto known = entries_.find(kernel.name);
+    if (known != entries_.end()) {
+        if (known->second.words.data() == kernel.spirv.data()) return known->second.reflection.get();
+        error = formatted("two kernels are called '{}'", kernel.name);
+        return nullptr;
+    }
+    Result<rhi::Reflection> reflection = rhi::reflect_spirv(kernel.spirv);
+    if (!reflection || reflection->stage != rhi::ShaderStage::Compute) {
+        error =
+            formatted("kernel '{}': {}", kernel.name, reflection ? "not a compute shader" : reflection.error().message);
+        return nullptr;
+    }
+    Entry entry{kernel.spirv, std::make_unique<rhi::Reflection>(std::move(*reflection))};
+    return entries_.emplace(std::string(kernel.name), std::move(entry)).first->second.reflection.get();
+}
+
+const rhi::Reflection* Reflections::of(const RasterKernel& kernel, std::string& error) {
+    const auto known = entries_.find(kernel.name);
+    if (known != entries_.end()) {
+        if (known->second.words.data() == kernel.vertex.data()) return known->second.reflection.get();
+        error = formatted("two kernels are called '{}'", kernel.name);
+        return nullptr;
+    }
+    auto both = std::make_unique<rhi::Reflection>();
+    for (const auto& words : {kernel.vertex, kernel.fragment}) {
+        if (words.empty()) continue;
+        Result<rhi::Reflection> reflection = rhi::reflect_spirv(words);
+        if (!reflection) {
+            error = formatted("kernel '{}': {}", kernel.name, reflection.error().message);
+            return nullptr;
+        }
+        fold(*both, *reflection);
+    }
+    return entries_.emplace(std::string(kernel.name), Entry{kernel.vertex, std::move(both)})
+        .first->second.reflection.get();
+}
+
+void Reflections::forget(std::string_view name) {
+    if (const auto it = entries_.find(name); it != entries_.end()) entries_.erase(it);
+}
+
+// ---- pipelines
+
+PipelineLibrary::~PipelineLibrary() {
+    for (const auto& [name, c] : compute_) device_->destroy(c.pipeline);
+    for (const auto& [name, r] : raster_) device_->destroy(r.pipeline);
+}
+
+Result<void> PipelineLibrary::warm_up(std::span<const Kernel* const> kernels,
+                                      std::span<const RasterKernel* const> raster) {
+    warm_ = false;
+    for (const Kernel* kernel : kernels)
+        if (const auto p = get(*kernel); !p) return p.error();
+    for (const RasterKernel* kernel : raster)
+        if (const auto p = get(*kernel); !p) return p.error();
+    warm_ = true;
+    return {};
+}
+
+void PipelineLibrary::count(std::string_view name) {
+    ++made_;
+    if (!warm_) return;
+    ++made_late_;
+    log::warn("pipeline '{}' was made inside a frame: give its kernel to warm_up()", name);
+}
+
+Result<rhi::ComputePipeline> PipelineLibrary::make(const Kernel& kernel, std::span<const uint32_t> spirv) {
+    const auto module = device_->create_shader_module({.spirv = spirv, .label = kernel.name});
+    if (!module) return module.error();
+    auto pipeline =
+        device_->create_compute_pipeline({.shader = *module, .constants = kernel.constants, .label = kernel.name});
+    device_->destroy(*module);
+    return pipeline;
+}
+
+Result<rhi::ComputePipeline> PipelineLibrary::get(const Kernel& kernel) {
+    if (const auto it = compute_.find(kernel.name); it != compute_.end()) {
+        if (it->second.words == kernel.spirv.data()) return it->second.pipeline;
+        return Error{formatted("two kernels are called '{}'", kernel.name)};
+    }
+    const auto pipeline = make(kernel, kernel.spirv);
+    if (!pipeline) return pipeline.error();
+    compute_.emplace(std::string(kernel.name), Compute{.words = kernel.spirv.data(), .pipeline = *pipeline});
+    count(kernel.name);
+    return *pipeline;
+}
+
+Result<rhi::RenderPipeline> PipelineLibrary::get(const RasterKernel& kernel) {
+    if (const auto it = raster_.find(kernel.name); it != raster_.end()) {
+        if (it->second.words == kernel.vertex.data()) return it->second.pipeline;
+        return Error{formatted("two kernels are called '{}'", kernel.name)};
+    }
+    const auto vertex = device_->create_shader_module({.spirv = kernel.vertex, .label = kernel.name});
+    if (!vertex) return vertex.error();
+    rhi::ShaderModule fragment;
+    if (!kernel.fragment.empty()) {
+        const auto made = device_->create_shader_module({.spirv = kernel.fragment, .label = kernel.name});
+        if (!made) {
+            device_->destroy(*vertex);
+            return made.error();
+        }
+        fragment = *made;
+    }
+    const auto pipeline = device_->create_render_pipeline({.vertex = *vertex,
+                                                           .fragment = fragment,
+                                                           .vertex_buffers = kernel.vertex_buffers,
+                                                           .topology = kernel.topology,
+                                                           .cull = kernel.cull,
+                                                           .colors = kernel.colors,
+                                                           .depth = kernel.depth,
+                                                           .label = kernel.name});
+    device_->destroy(*vertex);
+    if (fragment) device_->destroy(fragment);
+    if (!pipeline) return pipeline.error();
+    raster_.emplace(std::string(kernel.name), Raster{.words = kernel.vertex.data(), .pipeline = *pipeline});
+    count(kernel.name);
+    return *pipeline;
+}
+
+Result<void> PipelineLibrary::replace(const Kernel& kernel, std::span<const uint32_t> spirv) {
+    const auto it = compute_.find(kernel.name);
+    if (it == compute_.end()) return Error{formatted("replace kernel '{}': it was never made", kernel.name)};
+    const auto was = rhi::reflect_spirv(kernel.spirv);
+    const auto is = rhi::reflect_spirv(spirv);
+    if (!was) return was.error();
+    if (!is) return Error{formatted("replace kernel '{}': {}", kernel.name, is.error().message), ErrorKind::Input};
+    if (const std::string difference = interface_difference(*was, *is); !difference.empty())
+        return Error{formatted("replace kernel '{}': {}", kernel.name, difference), ErrorKind::Input};
+    const auto pipeline = make(kernel, spirv);
+    if (!pipeline) return pipeline.error();
+    device_->destroy(it->second.pipeline);
+    it->second.pipeline = *pipeline;
+    ++made_;
+    return {};
+}
+
+}  // namespace kiln::render
