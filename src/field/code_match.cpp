@@ -10,8 +10,8 @@ namespace {
 constexpr uint32_t kMaterialAt = 1, kEditAt = 2;  // of a Shape's numbers
 
 bool has_params(sdf::Opcode op) {
-    return op != sdf::Opcode::PointCell && op != sdf::Opcode::Move && op != sdf::Opcode::Negate && op != sdf::Opcode::Empty &&
-           op != sdf::Opcode::Take;
+    return op != sdf::Opcode::PointCell && op != sdf::Opcode::Move && op != sdf::Opcode::Negate &&
+           op != sdf::Opcode::Empty && op != sdf::Opcode::Take;
 }
 
 }  // namespace
@@ -30,9 +30,14 @@ ParamBlocks::ParamBlocks(const sdf::Program& program) : sizes_(program.params.si
 }
 
 CodeMatch::CodeMatch(const sdf::Program& before, const sdf::Program& after)
-    : before_(before), after_(after), blocks_before_(before), blocks_after_(after), same_samples_(before.samples == after.samples) {}
+    : before_(before),
+      after_(after),
+      blocks_before_(before),
+      blocks_after_(after),
+      same_samples_(before.samples == after.samples) {}
 
-CodeMatch::Answer CodeMatch::compare(std::span<const sdf::Instruction> before, std::span<const sdf::Instruction> after) const {
+CodeMatch::Answer CodeMatch::compare(std::span<const sdf::Instruction> before,
+                                     std::span<const sdf::Instruction> after) const {
     if (before.size() != after.size() || !same_samples_) return Answer::Different;
     Answer answer = Answer::Same;
     for (size_t i = 0; i < before.size(); ++i) {
@@ -43,7 +48,9 @@ CodeMatch::Answer CodeMatch::compare(std::span<const sdf::Instruction> before, s
         if (size != blocks_after_.size_at(after[i].param)) return Answer::Different;
         const float* a = before_.params.data() + before[i].param;
         const float* b = after_.params.data() + after[i].param;
-        const auto same = [&](uint32_t from, uint32_t to) { return to <= from || std::memcmp(a + from, b + from, (to - from) * sizeof(float)) == 0; };
+        const auto same = [&](uint32_t from, uint32_t to) {
+            return to <= from || std::memcmp(a + from, b + from, (to - from) * sizeof(float)) == 0;
+        };
         // An edit's number changes nothing that is stored.
         const bool equal = op == sdf::Opcode::Constant ? same(kMaterialAt, kMaterialAt + 1)
                            : op == sdf::Opcode::Shape  ? same(0, kEditAt) && same(kEditAt + 1, size)

@@ -30,11 +30,11 @@ using Code = std::vector<sdf::Instruction>;
 
 namespace {
 
-constexpr int kTaskCells = 8;               // side of the nodes that are handed to workers
-constexpr int kTaskLevels = 4;              // 8, 4, 2, 1
+constexpr int kTaskCells = 8;   // side of the nodes that are handed to workers
+constexpr int kTaskLevels = 4;  // 8, 4, 2, 1
 constexpr int64_t kMaxCells = 1ll << 28;
-constexpr int64_t kMaxTexel = 1ll << 24;    // float holds every integer up to here
-constexpr float kHalfDiagonal = 6.0621779f; // of a cell, voxels: 3.5 * sqrt(3), rounded up
+constexpr int64_t kMaxTexel = 1ll << 24;     // float holds every integer up to here
+constexpr float kHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
 
 int floor_div(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
 
@@ -80,7 +80,7 @@ void fill_slice(const ivec3& texel, int k, float h, Slice& out) {
 }
 
 struct Leaf {
-    uint64_t cell;              // index in the grid
+    uint64_t cell;                  // index in the grid
     uint32_t first = 0, count = 0;  // code, in the task's own; count 0: the brick goes
     bool bake = false;
 };
@@ -100,7 +100,8 @@ struct TaskResult {
 };
 
 struct Scratch {
-    std::array<Code, kTaskLevels + 1> before, after;  // [0]: of the task's parent, [1]: of the task's node, and so on downwards
+    std::array<Code, kTaskLevels + 1> before,
+        after;  // [0]: of the task's parent, [1]: of the task's node, and so on downwards
     sdf::PruneScratch prune;
     Slice slice;
 };
@@ -116,7 +117,8 @@ struct Pending {
 
 class FieldBuilder {
 public:
-    FieldBuilder(const Field* old, std::shared_ptr<const sdf::Program> program, const FieldOptions& options, std::span<const Box3> dirty)
+    FieldBuilder(const Field* old, std::shared_ptr<const sdf::Program> program, const FieldOptions& options,
+                 std::span<const Box3> dirty)
         : old_(old), program_(std::move(program)), options_(options), out_(new Field), dirty_(dirty) {}
 
     Result<std::shared_ptr<const Field>> run() {
@@ -145,7 +147,8 @@ private:
         out_->program_ = program_;
         out_->options_ = options_;
         const float h = options_.voxel_size;
-        if (!(h > 0) || !std::isfinite(h)) return Error{"field: voxel size " + std::to_string(h) + "; must be above 0", ErrorKind::Usage};
+        if (!(h > 0) || !std::isfinite(h))
+            return Error{"field: voxel size " + std::to_string(h) + "; must be above 0", ErrorKind::Usage};
         if (old_ != nullptr) {
             out_->grid_ = old_->grid_;
             out_->cells_ = old_->cells_;
@@ -158,7 +161,8 @@ private:
         int first[3], size[3];
         for (size_t axis = 0; axis < 3; ++axis) {
             const double side = double(h) * kBrickVoxels;
-            const double a = std::floor(double(low[axis]) / side), b = std::max(std::ceil(double(high[axis]) / side), a + 1);
+            const double a = std::floor(double(low[axis]) / side),
+                         b = std::max(std::ceil(double(high[axis]) / side), a + 1);
             if (std::max(std::fabs(a), std::fabs(b)) * kBrickVoxels + 64 > double(kMaxTexel)) {
                 return Error{"field: bounds reach " + std::to_string(std::max(std::fabs(a), std::fabs(b)) * side) +
                                  " m, more than 2^24 voxels from the origin; use larger voxels",
@@ -169,7 +173,8 @@ private:
         }
         const double cells = double(size[0]) * size[1] * size[2];
         if (cells > double(kMaxCells)) {
-            return Error{"field: " + std::to_string(uint64_t(cells)) + " cells needed, at most " + std::to_string(kMaxCells) + " are possible",
+            return Error{"field: " + std::to_string(uint64_t(cells)) + " cells needed, at most " +
+                             std::to_string(kMaxCells) + " are possible",
                          ErrorKind::OutOfMemory};
         }
         size_ = {size[0], size[1], size[2]};
@@ -182,14 +187,18 @@ private:
     std::vector<Pending> split_to_tasks() {
         const GridParams& g = out_->grid_;
         int size = 1;
-        const auto wide = [&](int first, int count) { return floor_div(first + count - 1, size) - floor_div(first, size) > 1; };
+        const auto wide = [&](int first, int count) {
+            return floor_div(first + count - 1, size) - floor_div(first, size) > 1;
+        };
         while (wide(g.cell_x, g.size_x) || wide(g.cell_y, g.size_y) || wide(g.cell_z, g.size_z)) size *= 2;
         size = std::max(size, kTaskCells);
         std::vector<Pending> level;
         for (int z = floor_div(g.cell_z, size); z * size < g.cell_z + g.size_z; ++z) {
             for (int y = floor_div(g.cell_y, size); y * size < g.cell_y + g.size_y; ++y) {
                 for (int x = floor_div(g.cell_x, size); x * size < g.cell_x + g.size_x; ++x) {
-                    level.push_back({{{x * size, y * size, z * size}, size}, old_ != nullptr, old_ != nullptr ? old_->program_->code : Code{},
+                    level.push_back({{{x * size, y * size, z * size}, size},
+                                     old_ != nullptr,
+                                     old_ != nullptr ? old_->program_->code : Code{},
                                      program_->code});
                 }
             }
@@ -202,7 +211,9 @@ private:
                 Pending& parent = level[size_t(i)];
                 Code before, after;
                 bool in_old = parent.in_old;
-                if (!enter(parent.node, in_old, parent.before, parent.after, before, after, scratch, results[size_t(i)])) return;
+                if (!enter(parent.node, in_old, parent.before, parent.after, before, after, scratch,
+                           results[size_t(i)]))
+                    return;
                 for (int c = 0; c < 8; ++c) {
                     const Node child = child_of(parent.node, c);
                     if (outside(child)) continue;
@@ -225,14 +236,16 @@ private:
             to.leaves.push_back(leaf);
         }
         for (Moved moved : from.moved) to.moved.push_back({moved.slot, moved.first + base});
-        to.occupancy_changes.insert(to.occupancy_changes.end(), from.occupancy_changes.begin(), from.occupancy_changes.end());
+        to.occupancy_changes.insert(to.occupancy_changes.end(), from.occupancy_changes.begin(),
+                                    from.occupancy_changes.end());
         to.cells_tested += from.cells_tested;
         to.cells_evaluated += from.cells_evaluated;
     }
 
     static Node child_of(const Node& node, int c) {
         const int half = node.size / 2;
-        return {{node.cell.x + (c & 1) * half, node.cell.y + ((c >> 1) & 1) * half, node.cell.z + (c >> 2) * half}, half};
+        return {{node.cell.x + (c & 1) * half, node.cell.y + ((c >> 1) & 1) * half, node.cell.z + (c >> 2) * half},
+                half};
     }
 
     // The node's cells that are in the grid, counted from the grid's first.
@@ -244,7 +257,9 @@ private:
 
     bool outside(const Node& node) const { return cells_of(node).empty(); }
 
-    uint64_t cell_index(int x, int y, int z) const { return (uint64_t(z) * uint64_t(size_.y) + uint64_t(y)) * uint64_t(size_.x) + uint64_t(x); }
+    uint64_t cell_index(int x, int y, int z) const {
+        return (uint64_t(z) * uint64_t(size_.y) + uint64_t(y)) * uint64_t(size_.x) + uint64_t(x);
+    }
 
     template <typename Fn>
     void each_cell(const Node& node, Fn&& fn) {
@@ -257,18 +272,20 @@ private:
     }
 
     // Prunes for the node, and settles it as a whole where that is possible: false then. `in_old` may turn false.
-    bool enter(const Node& node, bool& in_old, const Code& parent_before, const Code& parent_after, Code& before, Code& after, Scratch& scratch,
-               TaskResult& result) {
+    bool enter(const Node& node, bool& in_old, const Code& parent_before, const Code& parent_after, Code& before,
+               Code& after, Scratch& scratch, TaskResult& result) {
         const Ball ball = ball_of(node, options_.voxel_size);
         const auto beyond = [&](float value) {
             return std::fabs(value) > ball.radius + options_.voxel_size + ball.slack + 4e-6f * std::fabs(value);
         };
         ++result.cells_tested;
-        const float value = sdf::prune(sdf::view(*program_, parent_after), ball.center, ball.radius, after, scratch.prune);
+        const float value =
+            sdf::prune(sdf::view(*program_, parent_after), ball.center, ball.radius, after, scratch.prune);
         bool was_beyond = false;
         if (in_old) {
             ++result.cells_tested;
-            const float old_value = sdf::prune(sdf::view(*old_->program_, parent_before), ball.center, ball.radius, before, scratch.prune);
+            const float old_value =
+                sdf::prune(sdf::view(*old_->program_, parent_before), ball.center, ball.radius, before, scratch.prune);
             const CodeMatch::Answer answer = match_->compare(before, after);
             if (answer == CodeMatch::Answer::Same) return false;
             if (answer == CodeMatch::Answer::Moved) {
@@ -320,8 +337,8 @@ private:
 
     // scratch.before[level], after[level]: code of the node's parent.
     void descend(const Node& node, bool in_old, size_t level, Scratch& scratch, TaskResult& result) {
-        if (!enter(node, in_old, scratch.before[level], scratch.after[level], scratch.before[level + 1], scratch.after[level + 1], scratch,
-                   result)) {
+        if (!enter(node, in_old, scratch.before[level], scratch.after[level], scratch.before[level + 1],
+                   scratch.after[level + 1], scratch, result)) {
             return;
         }
         if (node.size == 1) {
@@ -360,7 +377,8 @@ private:
             result.occupancy_changes.push_back(cell);
         } else if (!in_dirty(texel)) {
             const BrickRecord& record = old_->records_[word & kCellSlotMask];
-            leaf.bake = stores_differ(texel, {old_->code_.data() + record.code_first, record.code_count}, code, scratch);
+            leaf.bake =
+                stores_differ(texel, {old_->code_.data() + record.code_first, record.code_count}, code, scratch);
         }
         result.leaves.push_back(leaf);
         result.code.insert(result.code.end(), code.begin(), code.end());
@@ -375,7 +393,8 @@ private:
     }
 
     // Whether some texel would be stored otherwise: its distance, or within the band its materials.
-    bool stores_differ(const ivec3& texel, std::span<const sdf::Instruction> before, const Code& after, Scratch& scratch) {
+    bool stores_differ(const ivec3& texel, std::span<const sdf::Instruction> before, const Code& after,
+                       Scratch& scratch) {
         const float h = options_.voxel_size;
         for (int k = 0; k < kBrickTexels; ++k) {
             float a[64], b[64];
@@ -389,8 +408,8 @@ private:
                 const bool half = options_.format == DistanceFormat::Half;
                 if (half ? half_code(da) != half_code(db) : snorm8_code(da) != snorm8_code(db)) return true;
                 if ((std::fabs(da) < kBandVoxels) != (std::fabs(db) < kBandVoxels)) return true;
-                if (std::fabs(da) < kBandVoxels &&
-                    (mix_a[i].id0 != mix_b[i].id0 || mix_a[i].id1 != mix_b[i].id1 || mix_a[i].weight != mix_b[i].weight)) {
+                if (std::fabs(da) < kBandVoxels && (mix_a[i].id0 != mix_b[i].id0 || mix_a[i].id1 != mix_b[i].id1 ||
+                                                    mix_a[i].weight != mix_b[i].weight)) {
                     return true;
                 }
             }
@@ -410,7 +429,8 @@ private:
             out_->stats_.cells_tested += result.cells_tested;
             out_->stats_.cells_evaluated += result.cells_evaluated;
         }
-        std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.leaf.cell < b.leaf.cell; });
+        std::sort(entries.begin(), entries.end(),
+                  [](const Entry& a, const Entry& b) { return a.leaf.cell < b.leaf.cell; });
 
         BrickPool pool(std::min(options_.max_bricks, kCellSlotMask + 1));
         if (old_ != nullptr) {
@@ -431,7 +451,8 @@ private:
         for (const TaskResult& result : results) {
             for (const Moved& moved : result.moved) {
                 const BrickRecord& record = out_->records_[moved.slot];
-                std::copy_n(result.code.begin() + moved.first, record.code_count, out_->code_.begin() + record.code_first);
+                std::copy_n(result.code.begin() + moved.first, record.code_count,
+                            out_->code_.begin() + record.code_first);
             }
         }
         const GridParams& g = out_->grid_;
@@ -453,15 +474,17 @@ private:
                 record.code_count = entry.leaf.count;
                 out_->code_.resize(out_->code_.size() + entry.leaf.count);
             }
-            std::copy_n(entry.code->begin() + entry.leaf.first, entry.leaf.count, out_->code_.begin() + record.code_first);
+            std::copy_n(entry.code->begin() + entry.leaf.first, entry.leaf.count,
+                        out_->code_.begin() + record.code_first);
             out_->cells_[cell] = kCellOccupied | slot;
             if (entry.leaf.bake) {
-                out_->jobs_.push_back({slot, {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count});
+                out_->jobs_.push_back(
+                    {slot, {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count});
             }
         }
         if (pool.refused() != 0) {
-            return Error{"field: " + std::to_string(uint64_t(pool.in_use()) + pool.refused()) + " bricks needed, the pool holds " +
-                             std::to_string(options_.max_bricks),
+            return Error{"field: " + std::to_string(uint64_t(pool.in_use()) + pool.refused()) +
+                             " bricks needed, the pool holds " + std::to_string(options_.max_bricks),
                          ErrorKind::OutOfMemory};
         }
         out_->stats_.bricks = pool.in_use();
@@ -513,11 +536,13 @@ private:
     TaskResult upper_;  // what nodes above the tasks settled
 };
 
-Result<std::shared_ptr<const Field>> Field::build(std::shared_ptr<const sdf::Program> program, const FieldOptions& options) {
+Result<std::shared_ptr<const Field>> Field::build(std::shared_ptr<const sdf::Program> program,
+                                                  const FieldOptions& options) {
     return FieldBuilder(nullptr, std::move(program), options, {}).run();
 }
 
-Result<std::shared_ptr<const Field>> Field::update(const Field& old, std::shared_ptr<const sdf::Program> program, std::span<const Box3> dirty) {
+Result<std::shared_ptr<const Field>> Field::update(const Field& old, std::shared_ptr<const sdf::Program> program,
+                                                   std::span<const Box3> dirty) {
     return FieldBuilder(&old, std::move(program), old.options_, dirty).run();
 }
 

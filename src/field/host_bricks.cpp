@@ -34,8 +34,9 @@ public:
 
     // The 16 heaviest, ties to the lower number, in ascending order; the number left out.
     uint32_t finish(uint32_t* palette) {
-        std::sort(entries_.begin(), entries_.end(),
-                  [](const Entry& a, const Entry& b) { return a.weight != b.weight ? a.weight > b.weight : a.id < b.id; });
+        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+            return a.weight != b.weight ? a.weight > b.weight : a.id < b.id;
+        });
         const uint32_t kept = uint32_t(std::min(entries_.size(), kPalette));
         const uint16_t heaviest = entries_.empty() ? uint16_t(0) : entries_[0].id;
         const uint32_t left_out = uint32_t(entries_.size()) - kept;
@@ -70,10 +71,12 @@ struct Reader {
     std::span<const uint32_t> cells;
     GridParams grid_params;
 
-    explicit Reader(const HostBricks& host) : bricks(host), cells(host.field().cells()), grid_params(host.field().grid()) {}
+    explicit Reader(const HostBricks& host)
+        : bricks(host), cells(host.field().cells()), grid_params(host.field().grid()) {}
 
     uint field_cell(ivec3 cell) const {
-        return cells[(size_t(cell.z) * size_t(grid_params.size_y) + size_t(cell.y)) * size_t(grid_params.size_x) + size_t(cell.x)];
+        return cells[(size_t(cell.z) * size_t(grid_params.size_y) + size_t(cell.y)) * size_t(grid_params.size_x) +
+                     size_t(cell.x)];
     }
     int field_slot(ivec3 cell) const {
         const uint32_t word = bricks.field().cell_word(cell.x, cell.y, cell.z);
@@ -140,7 +143,8 @@ void bake_brick(const Field& field, const BrickJob& job, BrickTexels& out) {
         if (slot0 < 0) slot0 = slot1 >= 0 ? slot1 : palette.heaviest_slot();
         if (!both) slot1 = slot0;
         out.material[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot1), both ? mix.weight : 0.0f));
-        if (out.material[i] >> 8 == 0) out.material[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot0), 0.0f));
+        if (out.material[i] >> 8 == 0)
+            out.material[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot0), 0.0f));
     }
 }
 
@@ -216,17 +220,21 @@ float HostBricks::texel(uint32_t slot, int x, int y, int z) const {
 }
 
 Corners HostBricks::corners(uint32_t slot, ivec3 v) const {
-    return {texel(slot, v.x, v.y, v.z),         texel(slot, v.x + 1, v.y, v.z),         texel(slot, v.x, v.y + 1, v.z),
-            texel(slot, v.x + 1, v.y + 1, v.z), texel(slot, v.x, v.y, v.z + 1),         texel(slot, v.x + 1, v.y, v.z + 1),
+    return {texel(slot, v.x, v.y, v.z),         texel(slot, v.x + 1, v.y, v.z),
+            texel(slot, v.x, v.y + 1, v.z),     texel(slot, v.x + 1, v.y + 1, v.z),
+            texel(slot, v.x, v.y, v.z + 1),     texel(slot, v.x + 1, v.y, v.z + 1),
             texel(slot, v.x, v.y + 1, v.z + 1), texel(slot, v.x + 1, v.y + 1, v.z + 1)};
 }
 
 vec3 HostBricks::gradient(uint32_t slot, ivec3 cell, vec3 p, NormalKind kind) const {
     Reader reader(*this);
     switch (kind) {
-        case NormalKind::Dual: return reader.dual_gradient(int(slot), cell, p);
-        case NormalKind::Central: return reader.central_gradient(int(slot), cell, p);
-        case NormalKind::Tetrahedral: return reader.tetrahedral_gradient(int(slot), cell, p);
+    case NormalKind::Dual:
+        return reader.dual_gradient(int(slot), cell, p);
+    case NormalKind::Central:
+        return reader.central_gradient(int(slot), cell, p);
+    case NormalKind::Tetrahedral:
+        return reader.tetrahedral_gradient(int(slot), cell, p);
     }
     return {};
 }
@@ -249,11 +257,13 @@ HostBricks::Sample HostBricks::sample(dvec3 p_world, NormalKind kind) const {
     Sample out;
     if (std::max({std::fabs(t[0]), std::fabs(t[1]), std::fabs(t[2])}) < double(1 << 24)) {
         const ivec3 global{int(std::floor(t[0])), int(std::floor(t[1])), int(std::floor(t[2]))};
-        const ivec3 cell{floor_div(global.x, kBrickVoxels), floor_div(global.y, kBrickVoxels), floor_div(global.z, kBrickVoxels)};
+        const ivec3 cell{floor_div(global.x, kBrickVoxels), floor_div(global.y, kBrickVoxels),
+                         floor_div(global.z, kBrickVoxels)};
         const uint32_t word = field_->cell_word(cell.x, cell.y, cell.z);
         if ((word & kCellOccupied) != 0) {
             const uint32_t slot = word & kCellSlotMask;
-            const ivec3 voxel{global.x - cell.x * kBrickVoxels, global.y - cell.y * kBrickVoxels, global.z - cell.z * kBrickVoxels};
+            const ivec3 voxel{global.x - cell.x * kBrickVoxels, global.y - cell.y * kBrickVoxels,
+                              global.z - cell.z * kBrickVoxels};
             const vec3 p{float(t[0] - global.x), float(t[1] - global.y), float(t[2] - global.z)};
             const Corners c = corners(slot, voxel);
             bool whole = true;
@@ -270,7 +280,9 @@ HostBricks::Sample HostBricks::sample(dvec3 p_world, NormalKind kind) const {
     const sdf::TapeView tape = sdf::view(field_->program());
     out.distance = sdf::evaluate(tape, p_world);
     const double step = 0.01 * h;
-    const auto slope = [&](dvec3 a, dvec3 b) { return float((sdf::evaluate(tape, a) - sdf::evaluate(tape, b)) / (2 * step)); };
+    const auto slope = [&](dvec3 a, dvec3 b) {
+        return float((sdf::evaluate(tape, a) - sdf::evaluate(tape, b)) / (2 * step));
+    };
     out.normal = unit({slope({p_world.x + step, p_world.y, p_world.z}, {p_world.x - step, p_world.y, p_world.z}),
                        slope({p_world.x, p_world.y + step, p_world.z}, {p_world.x, p_world.y - step, p_world.z}),
                        slope({p_world.x, p_world.y, p_world.z + step}, {p_world.x, p_world.y, p_world.z - step})});
@@ -289,13 +301,16 @@ MarchHit HostBricks::march(const TexelRay& ray, float t_min, float t_max, bool a
     return reader.field_march(field_->grid(), ray, t_min, t_max, accelerate);
 }
 
-HostBricks::Hit HostBricks::cast(dvec3 origin_world, vec3 direction, double t_max, NormalKind kind, bool accelerate) const {
+HostBricks::Hit HostBricks::cast(dvec3 origin_world, vec3 direction, double t_max, NormalKind kind,
+                                 bool accelerate) const {
     const float h = field_->grid().voxel_size;
     Hit out;
-    out.march = march(texel_ray_of(origin_world, direction, h), 0.0f, float(std::min(t_max / double(h), double(kFarVoxels))), accelerate);
+    out.march = march(texel_ray_of(origin_world, direction, h), 0.0f,
+                      float(std::min(t_max / double(h), double(kFarVoxels))), accelerate);
     out.state = out.march.state;
     out.t = double(out.march.t) * double(h);
-    if (out.state == kMarchHit) surface_at(uint32_t(out.march.slot), out.march.cell, out.march.voxel, out.march.p, kind, out.surface);
+    if (out.state == kMarchHit)
+        surface_at(uint32_t(out.march.slot), out.march.cell, out.march.voxel, out.march.p, kind, out.surface);
     return out;
 }
 

@@ -24,10 +24,10 @@ enum class NormalKind : uint8_t { Dual, Central, Tetrahedral };
 
 /// What a brick's texels are, before anything is packed.
 struct BrickTexels {
-    float distance[kBrickTexelCount];      ///< metres, not clamped
-    uint16_t material[kBrickTexelCount];   ///< words
+    float distance[kBrickTexelCount];     ///< metres, not clamped
+    uint16_t material[kBrickTexelCount];  ///< words
     uint32_t palette[kPaletteSize];
-    uint32_t dropped;                      ///< materials that found no place in the palette
+    uint32_t dropped;  ///< materials that found no place in the palette
 };
 
 /// Evaluates one job. Any thread.
@@ -54,23 +54,24 @@ public:
     Corners corners(uint32_t slot, ivec3 voxel) const;
 
     struct Sample {
-        double distance = 0;       ///< metres, negative inside
-        vec3 normal;               ///< unit; 0 where the gradient vanishes
+        double distance = 0;                    ///< metres, negative inside
+        vec3 normal;                            ///< unit; 0 where the gradient vanishes
         uint16_t material0 = 0, material1 = 0;  ///< material numbers, the heaviest first; equal when there is one
-        float share = 0;           ///< the second's, [0, 1/2]
+        float share = 0;                        ///< the second's, [0, 1/2]
         bool from_brick = false;
     };
     /// Trilinear where a brick is and none of the eight texels is cut off at the band; elsewhere the exact program.
     Sample sample(dvec3 p_world, NormalKind kind = NormalKind::Dual) const;
 
     struct Hit {
-        int state = kMarchMiss;    ///< kMarchMiss, kMarchHit, kMarchInside
-        double t = 0;              ///< metres
-        Sample surface;            ///< of a kMarchHit; its distance is 0
+        int state = kMarchMiss;  ///< kMarchMiss, kMarchHit, kMarchInside
+        double t = 0;            ///< metres
+        Sample surface;          ///< of a kMarchHit; its distance is 0
         MarchHit march;
     };
     /// First solid point along a ray through the grid; `direction` has unit length, t_max is in metres.
-    Hit cast(dvec3 origin_world, vec3 direction, double t_max, NormalKind kind = NormalKind::Dual, bool accelerate = true) const;
+    Hit cast(dvec3 origin_world, vec3 direction, double t_max, NormalKind kind = NormalKind::Dual,
+             bool accelerate = true) const;
     /// The march alone, in voxels.
     MarchHit march(const TexelRay& ray, float t_min, float t_max, bool accelerate = true) const;
     /// Not normalised, per voxel, at p in the brick of a world cell ([0, 7]³).

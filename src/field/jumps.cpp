@@ -29,7 +29,8 @@ void least_along(const uint8_t* in, uint8_t* out, int count, size_t stride) {
 
 CellBox grown(const CellBox& box, int by, ivec3 grid_size) {
     return {{std::max(box.min.x - by, 0), std::max(box.min.y - by, 0), std::max(box.min.z - by, 0)},
-            {std::min(box.max.x + by, grid_size.x), std::min(box.max.y + by, grid_size.y), std::min(box.max.z + by, grid_size.z)}};
+            {std::min(box.max.x + by, grid_size.x), std::min(box.max.y + by, grid_size.y),
+             std::min(box.max.z + by, grid_size.z)}};
 }
 
 void update_jumps(std::span<uint32_t> cells, ivec3 grid_size, const CellBox& box, int workers) {
@@ -38,7 +39,8 @@ void update_jumps(std::span<uint32_t> cells, ivec3 grid_size, const CellBox& box
     const ivec3 size = wide.max - wide.min;
     const size_t row = size_t(size.x), slab = row * size_t(size.y);
     const auto cell_index = [&](int x, int y, int z) {
-        return (size_t(wide.min.z + z) * size_t(grid_size.y) + size_t(wide.min.y + y)) * size_t(grid_size.x) + size_t(wide.min.x + x);
+        return (size_t(wide.min.z + z) * size_t(grid_size.y) + size_t(wide.min.y + y)) * size_t(grid_size.x) +
+               size_t(wide.min.x + x);
     };
     std::vector<uint8_t> a(slab * size_t(size.z)), b(a.size());
     parallel_for(size.z, workers, [&](int z) {
@@ -46,7 +48,8 @@ void update_jumps(std::span<uint32_t> cells, ivec3 grid_size, const CellBox& box
         uint8_t* to = b.data() + size_t(z) * slab;
         for (int y = 0; y < size.y; ++y) {
             for (int x = 0; x < size.x; ++x) {
-                from[size_t(y) * row + size_t(x)] = (cells[cell_index(x, y, z)] & kCellOccupied) != 0 ? 0 : uint8_t(kMaxJump);
+                from[size_t(y) * row + size_t(x)] =
+                    (cells[cell_index(x, y, z)] & kCellOccupied) != 0 ? 0 : uint8_t(kMaxJump);
             }
             least_along(from + size_t(y) * row, to + size_t(y) * row, size.x, 1);
         }

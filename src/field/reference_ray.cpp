@@ -16,13 +16,15 @@ struct Line {
 };
 
 // Where the line is between the planes low and high of all three axes.
-bool clip(const Line& line, const std::array<double, 3>& low, const std::array<double, 3>& high, double& enter, double& leave) {
+bool clip(const Line& line, const std::array<double, 3>& low, const std::array<double, 3>& high, double& enter,
+          double& leave) {
     for (size_t axis = 0; axis < 3; ++axis) {
         if (line.direction[axis] == 0) {
             if (line.origin[axis] < low[axis] || line.origin[axis] > high[axis]) return false;
             continue;
         }
-        double a = (low[axis] - line.origin[axis]) / line.direction[axis], b = (high[axis] - line.origin[axis]) / line.direction[axis];
+        double a = (low[axis] - line.origin[axis]) / line.direction[axis],
+               b = (high[axis] - line.origin[axis]) / line.direction[axis];
         if (a > b) std::swap(a, b);
         enter = std::max(enter, a);
         leave = std::min(leave, b);
@@ -82,8 +84,8 @@ std::array<double, 4> cut(const Voxel& voxel, const Line& line, double from, dou
     count = 0;
     std::array<double, 4> cuts{};
     cuts[size_t(count++)] = from;
-    const double f0 = voxel.at(line.at(from)), f1 = voxel.at(line.at(from + (to - from) / 3)), f2 = voxel.at(line.at(from + 2 * (to - from) / 3)),
-                 f3 = voxel.at(line.at(to));
+    const double f0 = voxel.at(line.at(from)), f1 = voxel.at(line.at(from + (to - from) / 3)),
+                 f2 = voxel.at(line.at(from + 2 * (to - from) / 3)), f3 = voxel.at(line.at(to));
     // Newton's forward differences on the thirds, u = 3 s.
     const double d1 = f1 - f0, d2 = f2 - 2 * f1 + f0, d3 = f3 - 3 * f2 + 3 * f1 - f0;
     // f = f0 + u d1 + u (u − 1) d2 / 2 + u (u − 1)(u − 2) d3 / 6
@@ -125,14 +127,15 @@ ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double
     line.direction = {double(ray.direction.x), double(ray.direction.y), double(ray.direction.z)};
     const GridParams grid = bricks.field().grid();
     const std::array<double, 3> low{double(grid.cell_x) * 7, double(grid.cell_y) * 7, double(grid.cell_z) * 7};
-    const std::array<double, 3> high{low[0] + double(grid.size_x) * 7, low[1] + double(grid.size_y) * 7, low[2] + double(grid.size_z) * 7};
+    const std::array<double, 3> high{low[0] + double(grid.size_x) * 7, low[1] + double(grid.size_y) * 7,
+                                     low[2] + double(grid.size_z) * 7};
     ReferenceHit hit;
     double enter = 0, leave = t_max;
     if (!clip(line, low, high, enter, leave)) return hit;
 
-    double last = 1e30;     // value before the current piece
+    double last = 1e30;  // value before the current piece
     bool falling = false;
-    bool done = false;      // the minimum after the hit has been seen
+    bool done = false;  // the minimum after the hit has been seen
     // One monotone piece's end.
     const auto follow = [&](double value) {
         if (falling && value >= last) {
@@ -143,8 +146,9 @@ ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double
         last = value;
     };
     walk(line, kBrickVoxels, enter, leave, [&](const std::array<int, 3>& cell, double from, double to) {
-        if (cell[0] < grid.cell_x || cell[1] < grid.cell_y || cell[2] < grid.cell_z || cell[0] >= grid.cell_x + grid.size_x ||
-            cell[1] >= grid.cell_y + grid.size_y || cell[2] >= grid.cell_z + grid.size_z) {
+        if (cell[0] < grid.cell_x || cell[1] < grid.cell_y || cell[2] < grid.cell_z ||
+            cell[0] >= grid.cell_x + grid.size_x || cell[1] >= grid.cell_y + grid.size_y ||
+            cell[2] >= grid.cell_z + grid.size_z) {
             return false;
         }
         const uint32_t word = bricks.field().cell_word(cell[0], cell[1], cell[2]);
@@ -173,7 +177,8 @@ ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double
             const std::array<double, 4> cuts = cut(voxel, line, a, b, count);
             for (int i = 0; i < count; ++i) {
                 const double value = voxel.at(line.at(cuts[size_t(i)]));
-                if (i > 0 || last > 1e29) follow(value);  // a voxel starts with the value that the one before ended with
+                if (i > 0 || last > 1e29)
+                    follow(value);  // a voxel starts with the value that the one before ended with
                 if (hit.state == kMarchMiss && value <= 0) {
                     hit.state = kMarchHit;
                     hit.t = i == 0 ? cuts[0] : bisect(voxel, line, cuts[size_t(i - 1)], cuts[size_t(i)]);

@@ -9,7 +9,7 @@ namespace kiln::field {
 
 struct ReferenceHit {
     int state = kMarchMiss;
-    double t = 0;           ///< voxels along the ray
+    double t = 0;  ///< voxels along the ray
     /// Least |value| (voxels) where the value along the ray stops falling: before the hit, and once more after it. Near 0 the ray is
     /// tangent, and hit or miss is a matter of rounding.
     double least = 1e30;

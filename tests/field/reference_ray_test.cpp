@@ -57,18 +57,23 @@ Tally compare(const HostBricks& bricks, uint32_t seed, int rays) {
         if (!agree) {
             ++tally.mismatches;
             if (tally.mismatches <= 5) {
-                ADD_FAILURE() << "ray " << i << ": state " << got.state << " at " << got.t << ", reference " << expected.state << " at "
-                              << expected.t << ", least " << expected.least << ", origin " << ray.whole.x << "+" << ray.part.x << " "
-                              << ray.whole.y << "+" << ray.part.y << " " << ray.whole.z << "+" << ray.part.z << " direction "
-                              << ray.direction.x << " " << ray.direction.y << " " << ray.direction.z;
+                ADD_FAILURE() << "ray " << i << ": state " << got.state << " at " << got.t << ", reference "
+                              << expected.state << " at " << expected.t << ", least " << expected.least << ", origin "
+                              << ray.whole.x << "+" << ray.part.x << " " << ray.whole.y << "+" << ray.part.y << " "
+                              << ray.whole.z << "+" << ray.part.z << " direction " << ray.direction.x << " "
+                              << ray.direction.y << " " << ray.direction.z;
             }
         } else if (got.state != kMarchMiss) {
             tally.worst = std::max(tally.worst, off);
             if (off > 1e-4) {
                 ++tally.far;
                 if (tally.far <= 5) {
-                    ADD_FAILURE() << "ray " << i << ": t " << got.t << ", reference " << expected.t << " (" << off << " off), least "
-                                  << expected.least << ", slot " << got.slot << " cell " << got.cell.x << " " << got.cell.y << " " << got.cell.z << " voxel " << got.voxel.x << " " << got.voxel.y << " " << got.voxel.z << " p " << got.p.x << " " << got.p.y << " " << got.p.z << ", direction " << ray.direction.x << " " << ray.direction.y << " " << ray.direction.z;
+                    ADD_FAILURE() << "ray " << i << ": t " << got.t << ", reference " << expected.t << " (" << off
+                                  << " off), least " << expected.least << ", slot " << got.slot << " cell "
+                                  << got.cell.x << " " << got.cell.y << " " << got.cell.z << " voxel " << got.voxel.x
+                                  << " " << got.voxel.y << " " << got.voxel.z << " p " << got.p.x << " " << got.p.y
+                                  << " " << got.p.z << ", direction " << ray.direction.x << " " << ray.direction.y
+                                  << " " << ray.direction.z;
                 }
             }
         }
@@ -88,7 +93,9 @@ TEST(ReferenceRay, MarchAgreesWithBisectionOnEveryWorld) {
             EXPECT_EQ(tally.far, 0) << world.name << ": worst " << tally.worst;
             tangent += tally.tangent;
             rays += tally.rays;
-            RecordProperty(world.name + (format == DistanceFormat::Half ? " half worst voxels" : " snorm8 worst voxels"), std::to_string(tally.worst));
+            RecordProperty(
+                world.name + (format == DistanceFormat::Half ? " half worst voxels" : " snorm8 worst voxels"),
+                std::to_string(tally.worst));
         }
     }
     EXPECT_LE(tangent, rays / 10000) << "rays left out as tangent, of " << rays;
@@ -102,13 +109,14 @@ TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {
     for (int i = 0; i < 200000; ++i) {
         Cubic c{r.in(0, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1)};
         const int kind = r.below(6);
-        if (kind == 0) c.b3 = c.b2 = c.b1;                                  // flat end
+        if (kind == 0) c.b3 = c.b2 = c.b1;                                                        // flat end
         if (kind == 1) c = {c.b0, c.b0 + (c.b3 - c.b0) / 3, c.b0 + (c.b3 - c.b0) * 2 / 3, c.b3};  // a straight line
-        if (kind == 2) c.b3 = c.b0 - 3 * (c.b1 - c.b2);                     // a parabola
+        if (kind == 2) c.b3 = c.b0 - 3 * (c.b1 - c.b2);                                           // a parabola
         if (kind == 3) c.b1 = c.b0 * 1e-6f;
         const auto at = [&](double s) {
             const double q = 1 - s;
-            return double(c.b0) * q * q * q + 3 * double(c.b1) * q * q * s + 3 * double(c.b2) * q * s * s + double(c.b3) * s * s * s;
+            return double(c.b0) * q * q * q + 3 * double(c.b1) * q * q * s + 3 * double(c.b2) * q * s * s +
+                   double(c.b3) * s * s * s;
         };
         // A double root can hide between samples; how far below 0 it dips then is bounded by the spacing.
         constexpr int kSteps = 512;
@@ -126,13 +134,15 @@ TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {
         const double got = double(cubic_first_root(c));
         if (expected > 1) {
             if (got <= 1) {
-                EXPECT_LT(least, 1e-4) << "a root at " << got << " of " << c.b0 << " " << c.b1 << " " << c.b2 << " " << c.b3;
+                EXPECT_LT(least, 1e-4) << "a root at " << got << " of " << c.b0 << " " << c.b1 << " " << c.b2 << " "
+                                       << c.b3;
                 EXPECT_NEAR(at(got), 0, 1e-6);
             }
             continue;
         }
         ++roots;
-        ASSERT_LE(got, 1) << "root " << expected << " of " << c.b0 << " " << c.b1 << " " << c.b2 << " " << c.b3 << " not found";
+        ASSERT_LE(got, 1) << "root " << expected << " of " << c.b0 << " " << c.b1 << " " << c.b2 << " " << c.b3
+                          << " not found";
         ASSERT_LT(std::fabs(at(got)), 2e-6) << got << " is no root; " << expected << " is";
         ASSERT_LT(got, expected + 1e-3);
     }
@@ -142,12 +152,14 @@ TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {
 TEST(ReferenceRay, CubicIsTheTrilinearValueAlongTheSegment) {
     worlds::Random r(4);
     for (int i = 0; i < 10000; ++i) {
-        const Corners c{r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1)};
+        const Corners c{r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1),
+                        r.in(-1, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1)};
         const vec3 p{r.in(0, 1), r.in(0, 1), r.in(0, 1)}, q{r.in(0, 1), r.in(0, 1), r.in(0, 1)};
         const Cubic cubic = cubic_along(c, p, q);
         const float s = r.in(0, 1);
         ASSERT_NEAR(cubic_value(cubic, s), trilinear_value(c, p + (q - p) * s), 1e-6f);
-        ASSERT_NEAR(cubic_slope(cubic, s), (cubic_value(cubic, s + 1e-3f) - cubic_value(cubic, s - 1e-3f)) / 2e-3f, 2e-3f);
+        ASSERT_NEAR(cubic_slope(cubic, s), (cubic_value(cubic, s + 1e-3f) - cubic_value(cubic, s - 1e-3f)) / 2e-3f,
+                    2e-3f);
     }
 }
 
@@ -182,7 +194,8 @@ TEST(ReferenceRay, ARayIsAsExactFromFarAway) {
         const double away = 3000;
         TexelRay ray;
         {
-            const double o[3] = {double(target.x) - double(d.x) * away, double(target.y) - double(d.y) * away, double(target.z) - double(d.z) * away};
+            const double o[3] = {double(target.x) - double(d.x) * away, double(target.y) - double(d.y) * away,
+                                 double(target.z) - double(d.z) * away};
             const ivec3 whole{int(std::floor(o[0])), int(std::floor(o[1])), int(std::floor(o[2]))};
             ray = texel_ray(whole, {float(o[0] - whole.x), float(o[1] - whole.y), float(o[2] - whole.z)}, d);
         }

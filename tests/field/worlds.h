@@ -69,11 +69,21 @@ public:
     Edit edit(float spread) {
         Edit e;
         switch (below(5)) {
-            case 0: e.node.shape = Sphere{.radius = in(0.1f, 0.4f)}; break;
-            case 1: e.node.shape = Box{.half_extents = {in(0.05f, 0.4f), in(0.05f, 0.4f), in(0.05f, 0.4f)}}; break;
-            case 2: e.node.shape = Torus{.major_radius = in(0.2f, 0.4f), .minor_radius = in(0.04f, 0.12f)}; break;
-            case 3: e.node.shape = RoundedBox{.half_extents = {0.3f, 0.2f, 0.25f}, .rounding = in(0.01f, 0.15f)}; break;
-            default: e.node.shape = Capsule{.half_height = in(0, 0.4f), .radius = in(0.05f, 0.2f)}; break;
+        case 0:
+            e.node.shape = Sphere{.radius = in(0.1f, 0.4f)};
+            break;
+        case 1:
+            e.node.shape = Box{.half_extents = {in(0.05f, 0.4f), in(0.05f, 0.4f), in(0.05f, 0.4f)}};
+            break;
+        case 2:
+            e.node.shape = Torus{.major_radius = in(0.2f, 0.4f), .minor_radius = in(0.04f, 0.12f)};
+            break;
+        case 3:
+            e.node.shape = RoundedBox{.half_extents = {0.3f, 0.2f, 0.25f}, .rounding = in(0.01f, 0.15f)};
+            break;
+        default:
+            e.node.shape = Capsule{.half_height = in(0, 0.4f), .radius = in(0.05f, 0.2f)};
+            break;
         }
         e.node.transform.position = point(spread);
         e.node.transform.rotation = axis_angle(direction(), in(-3, 3));
@@ -92,7 +102,9 @@ private:
 
 inline World sphere_of(float radius_voxels, vec3 center_voxels = {0.3f, -0.2f, 0.4f}, float h = 0.05f) {
     const float size = (radius_voxels + 8) * h;
-    return {"sphere", {edit(Sphere{.radius = radius_voxels * h}, center_voxels * h)}, {.voxel_size = h, .bounds = {{-size, -size, -size}, {size, size, size}}}};
+    return {"sphere",
+            {edit(Sphere{.radius = radius_voxels * h}, center_voxels * h)},
+            {.voxel_size = h, .bounds = {{-size, -size, -size}, {size, size, size}}}};
 }
 
 /// About 40 edits in 2 m: unions, cuts, blends, warps, scales, paints.
@@ -116,7 +128,8 @@ inline World thin_walls() {
 
 inline World boxes() {
     World w{"boxes", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}}};
-    w.edits.push_back(edit(Box{.half_extents = {0.7f, 0.35f, 0.5f}}));  // faces on texels and on cell faces (0.35 = 7 voxels)
+    w.edits.push_back(
+        edit(Box{.half_extents = {0.7f, 0.35f, 0.5f}}));  // faces on texels and on cell faces (0.35 = 7 voxels)
     w.edits.push_back(edit(Box{.half_extents = {0.2f, 0.9f, 0.2f}}, {0.1f, 0, 0}, Op::Subtract));
     Edit turned = edit(Box{.half_extents = {0.4f, 0.4f, 0.4f}}, {-0.6f, 0.5f, 0.2f});
     turned.node.transform.rotation = axis_angle(normalize(vec3{1, 1, 0}), 0.7f);
@@ -128,7 +141,8 @@ inline World blends() {
     World w{"blends", {}, {.voxel_size = 0.04f, .bounds = {{-1.4f, -1.4f, -1.4f}, {1.4f, 1.4f, 1.4f}}}};
     w.edits.push_back(of_material(edit(Sphere{.radius = 0.5f}, {-0.3f, 0, 0}), 1));
     w.edits.push_back(of_material(edit(Sphere{.radius = 0.4f}, {0.4f, 0.1f, 0}, Op::Union, 0.3f), 2));
-    w.edits.push_back(of_material(edit(Torus{.major_radius = 0.6f, .minor_radius = 0.12f}, {0, 0.2f, 0.1f}, Op::Union, 0.1f), 3));
+    w.edits.push_back(
+        of_material(edit(Torus{.major_radius = 0.6f, .minor_radius = 0.12f}, {0, 0.2f, 0.1f}, Op::Union, 0.1f), 3));
     w.edits.push_back(of_material(edit(Sphere{.radius = 0.35f}, {0, 0.5f, 0.3f}, Op::Subtract, 0.15f), 4));
     return w;
 }

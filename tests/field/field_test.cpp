@@ -1,0 +1,375 @@
+// SPDX-License-Identifier: MIT
+// What the field says about a world, against asking the whole program at every texel of every cell.
+
+#include "field/field.h"
+
+#include "sdf/eval.h"
+#include "worlds.h"
+
+#include <cmath>
+#include <cstring>
+#include <functional>
+
+namespace kiln::field {
+namespace {
+
+std::vector<float> values_of_cell(const sdf::TapeView& tape, const int (&texel)[3], float h) {
+    std::vector<float> x(512), y(512), z(512), out(512);
+    for (size_t i = 0; i < 512; ++i) {
+        x[i] = float(texel[0] + int(i & 7)) * h;
+        y[i] = float(texel[1] + int(i >> 3 & 7)) * h;
+        z[i] = float(texel[2] + int(i >> 6)) * h;
+    }
+    sdf::evaluate(tape, {x.data(), y.data(), z.data(), 512}, out.data());
+    return out;
+}
+
+void each_cell(const Field& field, const std::function<void(int, int, int, uint32_t)>& fn) {
+    const GridParams g = field.grid();
+    for (int z = g.cell_z; z < g.cell_z + g.size_z; ++z) {
+        for (int y = g.cell_y; y < g.cell_y + g.size_y; ++y) {
+            for (int x = g.cell_x; x < g.cell_x + g.size_x; ++x) fn(x, y, z, field.cell_word(x, y, z));
+        }
+    }
+}
+
+// Occupancy, sign, record and pruned code of every cell.
+void expect_true_field(const Field& field, const std::string& name) {
+    const float h = field.grid().voxel_size;
+    uint32_t bricks = 0;
+    int wrong = 0;
+    each_cell(field, [&](int x, int y, int z, uint32_t word) {
+        if (wrong > 3) return;
+        const int texel[3] = {x * 7, y * 7, z * 7};
+        const std::vector<float> full = values_of_cell(sdf::view(field.program()), texel, h);
+        bool near = false;
+        for (const float v : full) near = near || std::fabs(v) < h;
+        const bool occupied = (word & kCellOccupied) != 0;
+        if (occupied != near) {
+            ADD_FAILURE() << name << ": cell " << x << " " << y << " " << z
+                          << (near ? " lacks its brick" : " has a brick for nothing");
+            ++wrong;
+            return;
+        }
+        if (!occupied) {
+            for (const float v : full) {
+                if ((v < 0) != ((word & kCellInside) != 0)) {
+                    ADD_FAILURE() << name << ": empty cell " << x << " " << y << " " << z
+                                  << " has the wrong sign: " << v;
+                    ++wrong;
+                    return;
+                }
+            }
+            return;
+        }
+        ++bricks;
+        const BrickRecord& record = field.records()[word & kCellSlotMask];
+        ASSERT_EQ(record.texel_x, texel[0]);
+        ASSERT_EQ(record.texel_y, texel[1]);
+        ASSERT_EQ(record.texel_z, texel[2]);
+        ASSERT_GT(record.code_count, 0u);
+        const auto code = field.code().subspan(record.code_first, record.code_count);
+        const std::vector<float> pruned = values_of_cell(sdf::view(field.program(), code), texel, h);
+        if (std::memcmp(pruned.data(), full.data(), 512 * sizeof(float)) != 0) {
+            for (size_t i = 0; i < 512; ++i) {
+                if (pruned[i] == full[i]) continue;
+                ADD_FAILURE() << name << ": cell " << x << " " << y << " " << z << " texel " << i << ": pruned "
+                              << pruned[i] << ", whole " << full[i];
+                ++wrong;
+                return;
+            }
+        }
+    });
+    EXPECT_EQ(field.stats().bricks, bricks) << name;
+}
+
+TEST(Field, CellsAreWhatTheWholeProgramSaysAndPrunedCodeHasItsBits) {
+    for (const worlds::World& world : worlds::all()) {
+        const std::shared_ptr<const Field> field = world.field();
+        ASSERT_TRUE(field);
+        expect_true_field(*field, world.name);
+        EXPECT_EQ(field->jobs().size(), field->stats().bricks);
+        EXPECT_GT(field->stats().bricks, 20u) << world.name;
+        std::vector<bool> used(field->slot_count(), false);
+        for (const BrickJob& job : field->jobs()) {
+            ASSERT_FALSE(used[job.slot]);
+            used[job.slot] = true;
+        }
+    }
+}
+
+TEST(Field, CullingLooksAtFewLeaves) {
+    const std::shared_ptr<const Field> field = worlds::sphere_of(60).field();
+    const GridParams g = field->grid();
+    const uint64_t cells = uint64_t(g.size_x) * uint64_t(g.size_y) * uint64_t(g.size_z);
+    EXPECT_LT(field->stats().cells_evaluated, cells / 3);
+    EXPECT_LT(field->stats().cells_evaluated, 3 * field->stats().bricks);
+}
+
+TEST(Field, JumpsLeadOverEmptyCellsOfOneSign) {
+    for (const worlds::World& world : {worlds::boxes(), worlds::thin_walls(), worlds::sphere_of(40)}) {
+        const std::shared_ptr<const Field> field = world.field();
+        each_cell(*field, [&](int x, int y, int z, uint32_t word) {
+            if ((word & kCellOccupied) != 0) return;
+            const int jump = int(word & 7u);
+            ASSERT_GE(jump, 1);
+            ASSERT_LE(jump, kMaxJump);
+            for (int c = 1 - jump; c < jump; ++c) {
+                for (int b = 1 - jump; b < jump; ++b) {
+                    for (int a = 1 - jump; a < jump; ++a) {
+                        const GridParams g = field->grid();
+                        const int cx = x + a, cy = y + b, cz = z + c;
+                        if (cx < g.cell_x || cy < g.cell_y || cz < g.cell_z || cx >= g.cell_x + g.size_x ||
+                            cy >= g.cell_y + g.size_y || cz >= g.cell_z + g.size_z) {
+                            continue;
+                        }
+                        const uint32_t other = field->cell_word(cx, cy, cz);
+                        ASSERT_EQ(other & (kCellOccupied | kCellInside), word & kCellInside);
+                    }
+                }
+            }
+        });
+    }
+}
+
+void expect_same_bytes(const Field& a, const Field& b) {
+    EXPECT_TRUE(std::ranges::equal(a.cells(), b.cells()));
+    EXPECT_TRUE(std::ranges::equal(a.code(), b.code()));
+    ASSERT_EQ(a.slot_count(), b.slot_count());
+    EXPECT_EQ(std::memcmp(a.records().data(), b.records().data(), a.records().size_bytes()), 0);
+    ASSERT_EQ(a.jobs().size(), b.jobs().size());
+    EXPECT_EQ(std::memcmp(a.jobs().data(), b.jobs().data(), a.jobs().size_bytes()), 0);
+}
+
+TEST(Field, SameBytesForAnyNumberOfWorkers) {
+    worlds::World world = worlds::jumble();
+    world.options.workers = 1;
+    const std::shared_ptr<const Field> one = world.field();
+    for (const int workers : {2, 3, 8}) {
+        world.options.workers = workers;
+        expect_same_bytes(*one, *world.field());
+    }
+}
+
+TEST(Field, EmptyAndSolidWorldsHaveNoBricks) {
+    worlds::World world{"nothing", {}, {.voxel_size = 0.05f, .bounds = {{-2, -2, -2}, {2, 2, 2}}}};
+    std::shared_ptr<const Field> field = world.field();
+    EXPECT_EQ(field->stats().bricks, 0u);
+    for (const uint32_t word : field->cells()) ASSERT_EQ(word, uint32_t(kMaxJump));
+    world.edits = {worlds::edit(Box{.half_extents = {50, 50, 50}})};
+    field = world.field();
+    EXPECT_EQ(field->stats().bricks, 0u);
+    for (const uint32_t word : field->cells()) ASSERT_EQ(word, kCellInside | uint32_t(kMaxJump));
+    world.edits = {worlds::edit(Box{.half_extents = {50, 50, 50}}, {}, Op::Subtract)};
+    field = world.field();
+    EXPECT_EQ(field->stats().bricks, 0u);
+    EXPECT_EQ(field->cell_word(0, 0, 0), uint32_t(kMaxJump));
+    EXPECT_EQ(field->cell_word(1000, 0, 0), 0u) << "outside the grid";
+}
+
+TEST(Field, AnUnboundedPlaneFillsItsLayerOfTheGrid) {
+    worlds::World world{
+        "plane", {worlds::edit(Plane{}, {0, 0.02f, 0})}, {.voxel_size = 0.05f, .bounds = {{-2, -1, -1}, {2, 1, 1}}}};
+    const std::shared_ptr<const Field> field = world.field();
+    const GridParams g = field->grid();
+    EXPECT_EQ(field->stats().bricks, uint32_t(2 * g.size_x * g.size_z))
+        << "the layer above and, within a voxel, the one below";
+    expect_true_field(*field, world.name);
+}
+
+TEST(Field, IsTheSameFarFromTheOrigin) {
+    for (const float away : {100.0f, 1000.0f}) {
+        worlds::World world = worlds::boxes();
+        for (Edit& e : world.edits)
+            e.node.transform.position = e.node.transform.position + vec3{away, -away, 0.5f * away};
+        world.options.bounds = {world.options.bounds.min + vec3{away, -away, 0.5f * away},
+                                world.options.bounds.max + vec3{away, -away, 0.5f * away}};
+        const std::shared_ptr<const Field> field = world.field();
+        ASSERT_TRUE(field);
+        expect_true_field(*field, world.name);
+    }
+}
+
+TEST(Field, AFullPoolNamesTheNumberNeeded) {
+    worlds::World world = worlds::blends();
+    const uint32_t needed = world.field()->stats().bricks;
+    world.options.max_bricks = needed;
+    EXPECT_TRUE(Field::build(worlds::compiled(world.edits), world.options));
+    world.options.max_bricks = needed - 1;
+    const auto refused = Field::build(worlds::compiled(world.edits), world.options);
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::OutOfMemory);
+    EXPECT_NE(refused.error().message.find(" " + std::to_string(needed) + " bricks needed"), std::string::npos)
+        << refused.error().message;
+}
+
+TEST(Field, BadOptionsAreRefused) {
+    const auto program = worlds::compiled({worlds::edit(Sphere{})});
+    const Box3 box{{-1, -1, -1}, {1, 1, 1}};
+    for (const float h :
+         {0.0f, -1.0f, std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        EXPECT_FALSE(Field::build(program, {.voxel_size = h, .bounds = box})) << h;
+    }
+    EXPECT_FALSE(Field::build(program, {.voxel_size = 0.1f, .bounds = Box3{}}));
+    EXPECT_FALSE(Field::build(
+        program, {.voxel_size = 0.1f, .bounds = {{-1, -1, -1}, {1, 1, std::numeric_limits<float>::infinity()}}}));
+    EXPECT_FALSE(Field::build(program, {.voxel_size = 1e-7f, .bounds = box}));
+    const auto huge =
+        Field::build(program, {.voxel_size = 0.1f, .bounds = {{-1e4f, -1e4f, -1e4f}, {1e4f, 1e4f, 1e4f}}});
+    ASSERT_FALSE(huge);
+    EXPECT_EQ(huge.error().kind, ErrorKind::OutOfMemory);
+}
+
+// The world, changed as people change worlds.
+void change(worlds::Random& r, std::vector<Edit>& edits) {
+    const int n = int(edits.size());
+    switch (n < 3 ? 0 : r.below(8)) {
+    case 0:
+        edits.push_back(r.edit(1));
+        break;
+    case 1:
+        edits.insert(edits.begin() + r.below(n), r.edit(1));
+        break;
+    case 2:
+        edits.erase(edits.begin() + r.below(n));
+        break;
+    case 3:
+        edits[size_t(r.below(n))].node.transform.position = r.point(1);
+        break;
+    case 4:
+        edits[size_t(r.below(n))].hidden = r.below(2) == 0;
+        break;
+    case 5:
+        edits[size_t(r.below(n))].node.material = MaterialId{uint32_t(r.below(6)), 0};
+        break;
+    case 6:
+        std::swap(edits[size_t(r.below(n))], edits[size_t(r.below(n))]);
+        break;
+    default:
+        edits[size_t(r.below(n))].blend_radius = r.in(0, 0.3f);
+        break;
+    }
+}
+
+// Same cells but for slots, same code of each brick.
+void expect_equal_fields(const Field& got, const Field& expected, const std::string& name) {
+    ASSERT_EQ(got.cells().size(), expected.cells().size());
+    uint32_t live = 0;
+    for (size_t i = 0; i < got.cells().size(); ++i) {
+        const uint32_t a = got.cells()[i], b = expected.cells()[i];
+        ASSERT_EQ((a & kCellOccupied) != 0 ? kCellOccupied : a, (b & kCellOccupied) != 0 ? kCellOccupied : b)
+            << name << " cell " << i;
+        if ((a & kCellOccupied) == 0) continue;
+        ++live;
+        const BrickRecord &ra = got.records()[a & kCellSlotMask], &rb = expected.records()[b & kCellSlotMask];
+        ASSERT_TRUE(ra.texel_x == rb.texel_x && ra.texel_y == rb.texel_y && ra.texel_z == rb.texel_z)
+            << name << " cell " << i;
+        ASSERT_TRUE(std::ranges::equal(got.code().subspan(ra.code_first, ra.code_count),
+                                       expected.code().subspan(rb.code_first, rb.code_count)))
+            << name << " cell " << i << ": other code";
+    }
+    uint32_t used = 0;
+    for (const BrickRecord& record : got.records()) used += record.code_count != 0;
+    EXPECT_EQ(used, live) << name << ": slots in use";
+    EXPECT_EQ(got.stats().bricks, expected.stats().bricks) << name;
+}
+
+TEST(Field, IncrementalIsFullAfterRandomEdits) {
+    for (const uint32_t seed : {1u, 2u, 3u}) {
+        worlds::World world = worlds::jumble(seed, 25);
+        world.options.format = seed == 2 ? DistanceFormat::Snorm8 : DistanceFormat::Half;
+        worlds::Random r(seed + 100);
+        std::shared_ptr<const Field> field = world.field();
+        HostBricks host = HostBricks::bake(field);
+        for (int step = 0; step < 30; ++step) {
+            const std::string name = "seed " + std::to_string(seed) + " step " + std::to_string(step);
+            change(r, world.edits);
+            const auto program = worlds::compiled(world.edits);
+            // The boxes are a hint: none, and everything, are as good.
+            std::vector<Box3> dirty;
+            if (step % 5 == 4) dirty.push_back(world.options.bounds);
+            auto next = Field::update(*field, program, dirty);
+            ASSERT_TRUE(next) << next.error().message;
+            EXPECT_EQ((*next)->parent_revision(), field->revision());
+            // Bricks that are no jobs keep their slots.
+            std::vector<bool> job((*next)->slot_count(), false);
+            for (const BrickJob& j : (*next)->jobs()) job[j.slot] = true;
+            for (size_t i = 0; i < field->cells().size(); ++i) {
+                const uint32_t word = (*next)->cells()[i];
+                if ((word & kCellOccupied) == 0 || job[word & kCellSlotMask]) continue;
+                ASSERT_EQ(word, field->cells()[i]) << name;
+            }
+            field = *next;
+            const std::shared_ptr<const Field> full = world.field();
+            expect_equal_fields(*field, *full, name);
+            host.update(field);
+            ASSERT_EQ(host.hash(), HostBricks::bake(full).hash()) << name;
+            if (HasFatalFailure()) return;
+        }
+    }
+}
+
+TEST(Field, AnUpdateThatChangesNothingBakesNothing) {
+    worlds::World world = worlds::jumble();
+    const std::shared_ptr<const Field> field = world.field();
+    const auto same = Field::update(*field, worlds::compiled(world.edits), {});
+    ASSERT_TRUE(same);
+    EXPECT_TRUE((*same)->jobs().empty());
+    EXPECT_LT((*same)->stats().cells_tested, 50u);
+    // An edit at the front that reaches nothing moves every number, and no texel.
+    world.edits.insert(world.edits.begin(), worlds::edit(Sphere{.radius = 0.1f}, {30, 0, 0}));
+    const auto moved = Field::update(**same, worlds::compiled(world.edits), {});
+    ASSERT_TRUE(moved);
+    EXPECT_TRUE((*moved)->jobs().empty());
+    EXPECT_EQ((*moved)->stats().cells_evaluated, 0u);
+    expect_equal_fields(**moved, *world.field(), "moved");
+}
+
+TEST(Field, ASmallEditBakesFewBricks) {
+    worlds::World world = worlds::sphere_of(40);
+    const std::shared_ptr<const Field> field = world.field();
+    world.edits.push_back(worlds::edit(Sphere{.radius = 0.1f}, {2.0f, 0, 0}, Op::Subtract));
+    const auto cut = Field::update(*field, worlds::compiled(world.edits), {});
+    ASSERT_TRUE(cut);
+    EXPECT_GT((*cut)->jobs().size(), 0u);
+    EXPECT_LE((*cut)->jobs().size(), 27u);
+    EXPECT_LT((*cut)->stats().cells_evaluated, 300u);
+    EXPECT_GT(field->stats().bricks, 300u);
+    // And back again: what was freed is free, what came is gone.
+    world.edits.pop_back();
+    const auto back = Field::update(**cut, worlds::compiled(world.edits), {});
+    ASSERT_TRUE(back);
+    expect_equal_fields(**back, *field, "undone");
+}
+
+TEST(Field, AFullPoolRefusesAnUpdateAndLeavesTheOldField) {
+    worlds::World world = worlds::sphere_of(10);
+    world.options.max_bricks = world.field()->stats().bricks + 5;
+    const std::shared_ptr<const Field> field = world.field();
+    world.edits.push_back(worlds::edit(Sphere{.radius = 0.3f}, {-0.5f, -0.5f, -0.5f}));
+    world.edits.push_back(worlds::edit(Box{.half_extents = {0.8f, 0.02f, 0.8f}}));
+    const auto refused = Field::update(*field, worlds::compiled(world.edits), {});
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().kind, ErrorKind::OutOfMemory);
+    expect_true_field(*field, "old");
+}
+
+TEST(Field, CodeThatNobodyUsesIsDropped) {
+    worlds::World world = worlds::jumble(4, 30);
+    std::shared_ptr<const Field> field = world.field();
+    worlds::Random r(1);
+    for (int i = 0; i < 60; ++i) {
+        world.edits[0].node.transform.position = r.point(0.5f);
+        world.edits[0].node.shape = Sphere{.radius = 0.8f};
+        auto next = Field::update(*field, worlds::compiled(world.edits), {});
+        ASSERT_TRUE(next);
+        field = *next;
+        uint64_t live = 0;
+        for (const BrickRecord& record : field->records()) live += record.code_count;
+        ASSERT_LE(field->code().size(), 2 * live + 1024);
+    }
+    expect_true_field(*field, "after 60 moves");
+}
+
+}  // namespace
+}  // namespace kiln::field
