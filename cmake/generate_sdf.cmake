@@ -6,6 +6,7 @@
 #   include/kiln/shapes.h      typed structs of the public interface
 #   sdf/texts.gen.inl          C++: every text, and the dispatchers of one lane type
 #   sdf/tables.gen.inl         C++: rows of names, fields, ranges
+#   sdf/library.gen.inl        C++: composite_object()
 #   sdf/texts.gen.glsl         GLSL: the same texts and dispatchers
 
 set(kiln_sdf_dir ${PROJECT_SOURCE_DIR}/src/sdf)
@@ -175,11 +176,15 @@ function(kiln_generate_sdf)
         math(EXPR kind "${kind} + 1")
     endforeach()
     set(primitive_count ${kind})
+    set(builder_includes)
+    set(builders)
     foreach(row IN LISTS composites)
         string(REPLACE "|" ";" row "${row}")
         list(GET row 0 type)
         list(GET row 1 name)
         kiln_sdf_read_text(${kiln_sdf_dir}/library/${name}.h ${type}Record t)
+        string(APPEND builder_includes "#include \"sdf/library/${name}.h\"\n")
+        string(APPEND builders "    case ${kind}: return ${name}_object(record_of<${type}Record>(params));\n")
         string(APPEND kinds "    ${type} = ${kind},\n")
         string(APPEND table "    {\"${name}\", KindRow::Composite, \"${t_doc}\",\n        {{\n${t_rows}        }}},\n")
         string(APPEND structs "/// ${t_doc}\nstruct ${type} {\n${t_public}    operator Shape() const {\n        Shape out;\n        out.kind = uint16_t(ShapeKind::${type});\n${t_store}        return out;\n    }\n};\n")
@@ -252,6 +257,16 @@ ${structs}
 }  // namespace kiln
 ")
     kiln_sdf_write(${kiln_gen_dir}/sdf/tables.gen.inl "${note}inline constexpr int kPrimitiveCount = ${primitive_count};\n${table}")
+    kiln_sdf_write(${kiln_gen_dir}/sdf/library.gen.inl "${note}${builder_includes}
+namespace kiln::sdf {
+Object composite_object(uint16_t kind, const std::array<float, kMaxParams>& params) {
+    switch (kind) {
+${builders}    }
+    KILN_ASSERT(false, \"kind {} is no composite\", kind);
+    return {};
+}
+}  // namespace kiln::sdf
+")
     kiln_sdf_write(${kiln_gen_dir}/sdf/texts.gen.inl "${note}${includes}
 KILN_SDF real shape_distance(uint32_t kind, real3 p, const float* w, Samples samples) {
     (void)samples;
