@@ -18,8 +18,9 @@ public:
         for (const Reflection* shader : shaders)
             for (const ReflectedBinding& b : shader->bindings) count = std::max(count, b.set + 1);
         if (count > kMaxBindGroups)
-            return Error{"shader uses bind group " + std::to_string(count - 1) + "; there are " + std::to_string(kMaxBindGroups),
-                         ErrorKind::Failed};
+            return Error{
+                "shader uses bind group " + std::to_string(count - 1) + "; there are " + std::to_string(kMaxBindGroups),
+                ErrorKind::Failed};
         std::vector<BindGroupLayout> out;
         for (uint32_t set = 0; set < count; ++set) {
             Result<std::vector<BindGroupLayoutEntry>> entries = layout_entries(shaders, set);

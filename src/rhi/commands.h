@@ -72,7 +72,7 @@ struct DepthAttachment {
     ViewHandle view = {};  // none: no depth
     Load load = Load::Clear;
     Store store = Store::Store;
-    float clear = 0.0f;  // far, in reversed depth
+    float clear = 0.0f;      // far, in reversed depth
     bool read_only = false;  // then Access::DepthRead, and the texture may also be sampled in the pass
 };
 
@@ -107,14 +107,17 @@ public:
     virtual void set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset = 0) = 0;
     virtual void set_index_buffer(BufferHandle buffer, bool is_32_bit = true, uint64_t offset = 0) = 0;
     // Pixels, origin top left. Default: the whole attachment.
-    virtual void set_viewport(float x, float y, float width, float height, float depth_min = 0, float depth_max = 1) = 0;
+    virtual void set_viewport(float x, float y, float width, float height, float depth_min = 0,
+                              float depth_max = 1) = 0;
     virtual void set_scissor(uint32_t x, uint32_t y, uint32_t width, uint32_t height) = 0;
     virtual void set_blend_constant(std::array<float, 4> rgba) = 0;
-    virtual void draw(uint32_t vertices, uint32_t instances = 1, uint32_t first_vertex = 0, uint32_t first_instance = 0) = 0;
-    virtual void draw_indexed(uint32_t indices, uint32_t instances = 1, uint32_t first_index = 0, int32_t base_vertex = 0,
-                              uint32_t first_instance = 0) = 0;
+    virtual void draw(uint32_t vertices, uint32_t instances = 1, uint32_t first_vertex = 0,
+                      uint32_t first_instance = 0) = 0;
+    virtual void draw_indexed(uint32_t indices, uint32_t instances = 1, uint32_t first_index = 0,
+                              int32_t base_vertex = 0, uint32_t first_instance = 0) = 0;
     virtual void draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws = 1, uint32_t stride = 16) = 0;
-    virtual void draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws = 1, uint32_t stride = 20) = 0;
+    virtual void draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws = 1,
+                                       uint32_t stride = 20) = 0;
     virtual void end() = 0;
 
     template <typename T>
@@ -132,12 +135,14 @@ public:
     virtual RenderPass& begin_render(const RenderPassDesc& desc) = 0;
 
     // Sizes and offsets in bytes, multiples of 4 between buffers. Access: CopyRead of source, CopyWrite of destination.
-    virtual void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) = 0;
+    virtual void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                             uint64_t size) = 0;
     virtual void copy_buffer_to_texture(const BufferLayout& src, const TexturePlace& dst, Extent size) = 0;
     virtual void copy_texture_to_buffer(const TexturePlace& src, const BufferLayout& dst, Extent size) = 0;
     virtual void copy_texture(const TexturePlace& src, const TexturePlace& dst, Extent size) = 0;
     // CopyWrite. Fills with a repeated 32-bit word.
-    virtual void clear_buffer(BufferHandle buffer, uint64_t offset = 0, uint64_t size = kWholeSize, uint32_t word = 0) = 0;
+    virtual void clear_buffer(BufferHandle buffer, uint64_t offset = 0, uint64_t size = kWholeSize,
+                              uint32_t word = 0) = 0;
     // CopyWrite. Components as the format reads them: float formats take floats, uint formats the numbers rounded.
     virtual void clear_texture(TextureHandle texture, std::array<float, 4> value = {}, Subresources range = {}) = 0;
 

@@ -19,7 +19,8 @@ Result<std::unique_ptr<Device>> create_backend(const DeviceOptions& options) {
         if (!adapter) return adapter.error();
         return vulkan::VulkanDevice::create(std::move(*instance), *adapter, options.pipeline_cache);
     }
-    return Error{formatted("no graphics backend '{}'; there are 'vulkan' and 'null'", options.backend), ErrorKind::Usage};
+    return Error{formatted("no graphics backend '{}'; there are 'vulkan' and 'null'", options.backend),
+                 ErrorKind::Usage};
 }
 
 }  // namespace

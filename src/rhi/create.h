@@ -10,8 +10,9 @@ struct DeviceOptions {
     std::string backend = "vulkan";  // "vulkan" | "null"
     // "auto": discrete, integrated, virtual, then CPU; "cpu-vulkan": a software rasteriser; else part of a device's name
     std::string device = "auto";
-    bool validation = false;      // wrap in the validate decorator and switch on the driver's own validation layer if present
-    bool pipeline_cache = true;   // keep compiled pipelines in $XDG_CACHE_HOME/kiln
+    bool validation =
+        false;  // wrap in the validate decorator and switch on the driver's own validation layer if present
+    bool pipeline_cache = true;  // keep compiled pipelines in $XDG_CACHE_HOME/kiln
 };
 
 // Error of kind NoDevice when there is none that fits: says which there are and what to install.

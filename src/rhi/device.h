@@ -18,7 +18,7 @@ namespace kiln::rhi {
 struct TextureWrite {
     TexturePlace place = {};
     Extent size = {};
-    uint32_t bytes_per_row = 0;   // of `bytes`; 0: tight
+    uint32_t bytes_per_row = 0;  // of `bytes`; 0: tight
     uint32_t rows_per_layer = 0;
     Access before = Access::Undefined;  // state of the subresource now; Undefined discards what lies outside the region
     Access after = Access::SampledReadCompute;

@@ -29,23 +29,32 @@ bool is_storage_texture(const ReflectedBinding& b) {
 std::vector<std::string> check_floor(const Reflection& r, const Caps& caps) {
     std::vector<std::string> out;
     const auto at_most = [&](uint64_t is, uint64_t most, std::string_view what) {
-        if (is > most) out.push_back(std::string(what) + ": " + std::to_string(is) + ", the floor is " + std::to_string(most));
+        if (is > most)
+            out.push_back(std::string(what) + ": " + std::to_string(is) + ", the floor is " + std::to_string(most));
     };
     uint32_t storage_buffers = 0, storage_textures = 0, sampled = 0, samplers = 0, uniforms = 0;
     for (const ReflectedBinding& b : r.bindings) {
         at_most(b.set + 1ull, kMaxBindGroups, "bind groups");
         if (b.array_count != 1 && !caps.bindless) out.push_back("binding '" + b.name + "' is an array of resources");
         switch (b.kind) {
-            case BindingKind::UniformBuffer:
-                ++uniforms;
-                at_most(b.block_size, kMaxUniformBinding, "bytes of uniform block '" + b.name + "'");
-                break;
-            case BindingKind::StorageBuffer:
-            case BindingKind::StorageBufferReadOnly: ++storage_buffers; break;
-            case BindingKind::SampledTexture: ++sampled; break;
-            case BindingKind::Sampler: ++samplers; break;
-            case BindingKind::StorageTexture:
-            case BindingKind::StorageTextureReadOnly: ++storage_textures; break;
+        case BindingKind::UniformBuffer:
+            ++uniforms;
+            at_most(b.block_size, kMaxUniformBinding, "bytes of uniform block '" + b.name + "'");
+            break;
+        case BindingKind::StorageBuffer:
+        case BindingKind::StorageBufferReadOnly:
+            ++storage_buffers;
+            break;
+        case BindingKind::SampledTexture:
+            ++sampled;
+            break;
+        case BindingKind::Sampler:
+            ++samplers;
+            break;
+        case BindingKind::StorageTexture:
+        case BindingKind::StorageTextureReadOnly:
+            ++storage_textures;
+            break;
         }
         if (!is_storage_texture(b)) continue;
         if (b.format == Format::Undefined) {
@@ -83,7 +92,8 @@ Result<std::vector<BindGroupLayoutEntry>> layout_entries(std::span<const Reflect
                                              .format = b.format,
                                              .dimension = b.dimension,
                                              .sample_type = b.sample_type};
-            const auto same = std::find_if(out.begin(), out.end(), [&](const auto& e) { return e.binding == b.binding; });
+            const auto same =
+                std::find_if(out.begin(), out.end(), [&](const auto& e) { return e.binding == b.binding; });
             if (same == out.end()) {
                 out.push_back(entry);
                 continue;
@@ -95,9 +105,9 @@ Result<std::vector<BindGroupLayoutEntry>> layout_entries(std::span<const Reflect
             if (is_buffer(same->kind) && is_buffer(entry.kind)) {
                 if (entry.kind == BindingKind::StorageBuffer) same->kind = BindingKind::StorageBuffer;
             } else if (same->kind != entry.kind || same->format != entry.format || same->dimension != entry.dimension) {
-                return Error{"shaders disagree on set " + std::to_string(set) + " binding " + std::to_string(b.binding) + ": " +
-                                 std::string(name(same->kind)) + " in one, " + std::string(name(entry.kind)) + " ('" + b.name +
-                                 "') in another",
+                return Error{"shaders disagree on set " + std::to_string(set) + " binding " +
+                                 std::to_string(b.binding) + ": " + std::string(name(same->kind)) + " in one, " +
+                                 std::string(name(entry.kind)) + " ('" + b.name + "') in another",
                              ErrorKind::Failed};
             }
         }

@@ -29,12 +29,12 @@ constexpr int kFormatCount = 14;
 enum class SampleType : uint8_t { Float, Uint, Depth };
 
 struct FormatInfo {
-    std::string_view name;       // as in the enumerator
+    std::string_view name;  // as in the enumerator
     uint32_t bytes_per_texel;
     uint32_t channels;
     SampleType sample_type;
-    bool filterable;             // linear sampling is allowed (32-bit floats: a driver option WebGPU lacks, so no)
-    bool core_storage;           // usable as a storage texture on every device; otherwise see Caps
+    bool filterable;    // linear sampling is allowed (32-bit floats: a driver option WebGPU lacks, so no)
+    bool core_storage;  // usable as a storage texture on every device; otherwise see Caps
 };
 
 const FormatInfo& info(Format format);

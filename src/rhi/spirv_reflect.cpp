@@ -100,56 +100,100 @@ struct Variable {
 
 Format format_of(uint32_t spirv_format) {
     switch (spirv_format) {
-        case 1: return Format::Rgba32Float;
-        case 2: return Format::Rgba16Float;
-        case 3: return Format::R32Float;
-        case 4: return Format::Rgba8Unorm;
-        case 7: return Format::Rg16Float;
-        case 8: return Format::R11g11b10Float;
-        case 9: return Format::R16Float;
-        case 20: return Format::R8Snorm;
-        case 30: return Format::Rgba32Uint;
-        case 33: return Format::R32Uint;
-        case 35: return Format::Rg32Uint;
-        case 38: return Format::R16Uint;
-        default: return Format::Undefined;
+    case 1:
+        return Format::Rgba32Float;
+    case 2:
+        return Format::Rgba16Float;
+    case 3:
+        return Format::R32Float;
+    case 4:
+        return Format::Rgba8Unorm;
+    case 7:
+        return Format::Rg16Float;
+    case 8:
+        return Format::R11g11b10Float;
+    case 9:
+        return Format::R16Float;
+    case 20:
+        return Format::R8Snorm;
+    case 30:
+        return Format::Rgba32Uint;
+    case 33:
+        return Format::R32Uint;
+    case 35:
+        return Format::Rg32Uint;
+    case 38:
+        return Format::R16Uint;
+    default:
+        return Format::Undefined;
     }
 }
 
 // Capabilities that some of our targets lack. Those not listed are on every one of them.
 std::string_view beyond_floor_name(uint32_t capability) {
     switch (capability) {
-        case 2: return "Geometry";
-        case 3: return "Tessellation";
-        case 9: return "Float16";
-        case 10: return "Float64";
-        case 11: return "Int64";
-        case 12: return "Int64Atomics";
-        case 22: return "Int16";
-        case 29: return "SampledImageArrayDynamicIndexing";
-        case 31: return "StorageImageArrayDynamicIndexing";
-        case 39: return "Int8";
-        case 49: return "StorageImageExtendedFormats";
-        case 55: return "StorageImageReadWithoutFormat";
-        case 56: return "StorageImageWriteWithoutFormat";
-        case 61: return "GroupNonUniform";
-        case 62: return "GroupNonUniformVote";
-        case 63: return "GroupNonUniformArithmetic";
-        case 64: return "GroupNonUniformBallot";
-        case 65: return "GroupNonUniformShuffle";
-        case 66: return "GroupNonUniformShuffleRelative";
-        case 67: return "GroupNonUniformClustered";
-        case 68: return "GroupNonUniformQuad";
-        case 4433: return "StorageBuffer16BitAccess";
-        case 4448: return "StorageBuffer8BitAccess";
-        case 4472: return "RayQueryKHR";
-        case 4479: return "RayTracingKHR";
-        case 5283: return "MeshShadingEXT";
-        case 5301: return "ShaderNonUniform";
-        case 5302: return "RuntimeDescriptorArray";
-        case 5345: return "VulkanMemoryModel";
-        case 5347: return "PhysicalStorageBufferAddresses";
-        default: return {};
+    case 2:
+        return "Geometry";
+    case 3:
+        return "Tessellation";
+    case 9:
+        return "Float16";
+    case 10:
+        return "Float64";
+    case 11:
+        return "Int64";
+    case 12:
+        return "Int64Atomics";
+    case 22:
+        return "Int16";
+    case 29:
+        return "SampledImageArrayDynamicIndexing";
+    case 31:
+        return "StorageImageArrayDynamicIndexing";
+    case 39:
+        return "Int8";
+    case 49:
+        return "StorageImageExtendedFormats";
+    case 55:
+        return "StorageImageReadWithoutFormat";
+    case 56:
+        return "StorageImageWriteWithoutFormat";
+    case 61:
+        return "GroupNonUniform";
+    case 62:
+        return "GroupNonUniformVote";
+    case 63:
+        return "GroupNonUniformArithmetic";
+    case 64:
+        return "GroupNonUniformBallot";
+    case 65:
+        return "GroupNonUniformShuffle";
+    case 66:
+        return "GroupNonUniformShuffleRelative";
+    case 67:
+        return "GroupNonUniformClustered";
+    case 68:
+        return "GroupNonUniformQuad";
+    case 4433:
+        return "StorageBuffer16BitAccess";
+    case 4448:
+        return "StorageBuffer8BitAccess";
+    case 4472:
+        return "RayQueryKHR";
+    case 4479:
+        return "RayTracingKHR";
+    case 5283:
+        return "MeshShadingEXT";
+    case 5301:
+        return "ShaderNonUniform";
+    case 5302:
+        return "RuntimeDescriptorArray";
+    case 5345:
+        return "VulkanMemoryModel";
+    case 5347:
+        return "PhysicalStorageBufferAddresses";
+    default:
+        return {};
     }
 }
 
@@ -206,116 +250,141 @@ void Reader::instruction(uint32_t op, std::span<const uint32_t> args) {
     // Fewest words that each instruction we look into may have.
     const auto at_least = [&](size_t n) { return args.size() >= n; };
     switch (op) {
-        case OpName:
-            if (at_least(2)) ids_[args[0]].name = text(args.subspan(1));
-            break;
-        case OpMemberName:
-            if (at_least(3) && args[1] < 4096) ids_[args[0]].member(args[1]).name = text(args.subspan(2));
-            break;
-        case OpEntryPoint:
-            if (at_least(3) && entry_id_ == 0) {
-                const uint32_t model = args[0];
-                if (model == 0) out_.stage = ShaderStage::Vertex;
-                if (model == 4) out_.stage = ShaderStage::Fragment;
-                if (model == 5) out_.stage = ShaderStage::Compute;
-                if (out_.stage == ShaderStage::None) break;
-                entry_id_ = args[1];
-                out_.entry = text(args.subspan(2));
-            }
-            break;
-        case OpExecutionMode:
-            if (at_least(5) && args[0] == entry_id_ && args[1] == 17) out_.workgroup = {args[2], args[3], args[4]};
-            break;
-        case OpExecutionModeId:  // LocalSizeId: ids of constants, resolved in finish()
-            if (at_least(5) && args[0] == entry_id_ && args[1] == 38) {
-                ids_[entry_id_].members.clear();
-                for (uint32_t i = 0; i < 3; ++i) ids_[entry_id_].member(i).offset = args[2 + i];
-            }
-            break;
-        case OpCapability:
-            if (at_least(1))
-                if (const std::string_view text = beyond_floor_name(args[0]); !text.empty())
-                    out_.beyond_floor.emplace_back(text);
-            break;
-        case OpTypeBool:
-        case OpTypeSampler:
-            if (at_least(1)) types_[args[0]] = {.op = op, .width = 32};
-            break;
-        case OpTypeInt:
-            if (at_least(3)) types_[args[0]] = {.op = op, .width = args[1], .is_signed = args[2] != 0};
-            break;
-        case OpTypeFloat:
-            if (at_least(2)) types_[args[0]] = {.op = op, .width = args[1]};
-            break;
-        case OpTypeVector:
-        case OpTypeMatrix:
-        case OpTypeArray:
-            if (at_least(3)) types_[args[0]] = {.op = op, .element = args[1], .count = args[2]};
-            break;
-        case OpTypeRuntimeArray:
-        case OpTypeSampledImage:
-            if (at_least(2)) types_[args[0]] = {.op = op, .element = args[1]};
-            break;
-        case OpTypeImage:
-            if (at_least(8)) {
-                Type t{.op = op, .element = args[1]};
-                t.dim = args[2];
-                t.is_depth = args[3] == 1;
-                t.arrayed = args[4] != 0;
-                t.sampled = args[6];
-                t.image_format = args[7];
-                types_[args[0]] = t;
-            }
-            break;
-        case OpTypeStruct:
-            if (at_least(1)) {
-                Type t{.op = op};
-                t.members.assign(args.begin() + 1, args.end());
-                types_[args[0]] = std::move(t);
-            }
-            break;
-        case OpTypePointer:
-            if (at_least(3)) types_[args[0]] = {.op = op, .element = args[2], .storage_class = args[1]};
-            break;
-        case OpConstant:
-        case OpSpecConstant:
-            if (at_least(3)) constants_[args[1]] = args[2];
-            break;
-        case OpVariable:
-            if (at_least(3)) variables_.push_back({.id = args[1], .type = args[0], .storage_class = args[2]});
-            break;
-        case OpDecorate:
-            if (at_least(2)) decorate(ids_[args[0]], args[1], args.subspan(2));
-            break;
-        case OpMemberDecorate:
-            if (at_least(3) && args[1] < 4096) decorate_member(ids_[args[0]].member(args[1]), args[2], args.subspan(3));
-            break;
-        default: break;
+    case OpName:
+        if (at_least(2)) ids_[args[0]].name = text(args.subspan(1));
+        break;
+    case OpMemberName:
+        if (at_least(3) && args[1] < 4096) ids_[args[0]].member(args[1]).name = text(args.subspan(2));
+        break;
+    case OpEntryPoint:
+        if (at_least(3) && entry_id_ == 0) {
+            const uint32_t model = args[0];
+            if (model == 0) out_.stage = ShaderStage::Vertex;
+            if (model == 4) out_.stage = ShaderStage::Fragment;
+            if (model == 5) out_.stage = ShaderStage::Compute;
+            if (out_.stage == ShaderStage::None) break;
+            entry_id_ = args[1];
+            out_.entry = text(args.subspan(2));
+        }
+        break;
+    case OpExecutionMode:
+        if (at_least(5) && args[0] == entry_id_ && args[1] == 17) out_.workgroup = {args[2], args[3], args[4]};
+        break;
+    case OpExecutionModeId:  // LocalSizeId: ids of constants, resolved in finish()
+        if (at_least(5) && args[0] == entry_id_ && args[1] == 38) {
+            ids_[entry_id_].members.clear();
+            for (uint32_t i = 0; i < 3; ++i) ids_[entry_id_].member(i).offset = args[2 + i];
+        }
+        break;
+    case OpCapability:
+        if (at_least(1))
+            if (const std::string_view text = beyond_floor_name(args[0]); !text.empty())
+                out_.beyond_floor.emplace_back(text);
+        break;
+    case OpTypeBool:
+    case OpTypeSampler:
+        if (at_least(1)) types_[args[0]] = {.op = op, .width = 32};
+        break;
+    case OpTypeInt:
+        if (at_least(3)) types_[args[0]] = {.op = op, .width = args[1], .is_signed = args[2] != 0};
+        break;
+    case OpTypeFloat:
+        if (at_least(2)) types_[args[0]] = {.op = op, .width = args[1]};
+        break;
+    case OpTypeVector:
+    case OpTypeMatrix:
+    case OpTypeArray:
+        if (at_least(3)) types_[args[0]] = {.op = op, .element = args[1], .count = args[2]};
+        break;
+    case OpTypeRuntimeArray:
+    case OpTypeSampledImage:
+        if (at_least(2)) types_[args[0]] = {.op = op, .element = args[1]};
+        break;
+    case OpTypeImage:
+        if (at_least(8)) {
+            Type t{.op = op, .element = args[1]};
+            t.dim = args[2];
+            t.is_depth = args[3] == 1;
+            t.arrayed = args[4] != 0;
+            t.sampled = args[6];
+            t.image_format = args[7];
+            types_[args[0]] = t;
+        }
+        break;
+    case OpTypeStruct:
+        if (at_least(1)) {
+            Type t{.op = op};
+            t.members.assign(args.begin() + 1, args.end());
+            types_[args[0]] = std::move(t);
+        }
+        break;
+    case OpTypePointer:
+        if (at_least(3)) types_[args[0]] = {.op = op, .element = args[2], .storage_class = args[1]};
+        break;
+    case OpConstant:
+    case OpSpecConstant:
+        if (at_least(3)) constants_[args[1]] = args[2];
+        break;
+    case OpVariable:
+        if (at_least(3)) variables_.push_back({.id = args[1], .type = args[0], .storage_class = args[2]});
+        break;
+    case OpDecorate:
+        if (at_least(2)) decorate(ids_[args[0]], args[1], args.subspan(2));
+        break;
+    case OpMemberDecorate:
+        if (at_least(3) && args[1] < 4096) decorate_member(ids_[args[0]].member(args[1]), args[2], args.subspan(3));
+        break;
+    default:
+        break;
     }
 }
 
 void Reader::decorate(IdInfo& target, uint32_t decoration, std::span<const uint32_t> args) {
     const uint32_t value = args.empty() ? 0 : args[0];
     switch (decoration) {
-        case Block: target.block = true; break;
-        case BufferBlock: target.buffer_block = true; break;
-        case ArrayStride: target.array_stride = value; break;
-        case NonWritable: target.non_writable = true; break;
-        case NonReadable: target.non_readable = true; break;
-        case Binding: target.binding = value; break;
-        case DescriptorSet: target.set = value; break;
-        default: break;
+    case Block:
+        target.block = true;
+        break;
+    case BufferBlock:
+        target.buffer_block = true;
+        break;
+    case ArrayStride:
+        target.array_stride = value;
+        break;
+    case NonWritable:
+        target.non_writable = true;
+        break;
+    case NonReadable:
+        target.non_readable = true;
+        break;
+    case Binding:
+        target.binding = value;
+        break;
+    case DescriptorSet:
+        target.set = value;
+        break;
+    default:
+        break;
     }
 }
 
 void Reader::decorate_member(MemberInfo& target, uint32_t decoration, std::span<const uint32_t> args) {
     const uint32_t value = args.empty() ? 0 : args[0];
     switch (decoration) {
-        case Offset: target.offset = value; break;
-        case MatrixStride: target.matrix_stride = value; break;
-        case NonWritable: target.non_writable = true; break;
-        case NonReadable: target.non_readable = true; break;
-        default: break;
+    case Offset:
+        target.offset = value;
+        break;
+    case MatrixStride:
+        target.matrix_stride = value;
+        break;
+    case NonWritable:
+        target.non_writable = true;
+        break;
+    case NonReadable:
+        target.non_readable = true;
+        break;
+    default:
+        break;
     }
 }
 
@@ -335,24 +404,28 @@ uint32_t Reader::size_of(uint32_t type_id, uint32_t matrix_stride) const {
     const Type& t = type(type_id);
     const auto info = ids_.find(type_id);
     switch (t.op) {
-        case OpTypeBool:
-        case OpTypeInt:
-        case OpTypeFloat: return t.width / 8;
-        case OpTypeVector: return t.count * size_of(t.element);
-        case OpTypeMatrix: return t.count * (matrix_stride ? matrix_stride : size_of(t.element));
-        case OpTypeArray: {
-            const uint32_t stride = info == ids_.end() ? 0 : info->second.array_stride;
-            return constant(t.count) * (stride ? stride : size_of(t.element));
+    case OpTypeBool:
+    case OpTypeInt:
+    case OpTypeFloat:
+        return t.width / 8;
+    case OpTypeVector:
+        return t.count * size_of(t.element);
+    case OpTypeMatrix:
+        return t.count * (matrix_stride ? matrix_stride : size_of(t.element));
+    case OpTypeArray: {
+        const uint32_t stride = info == ids_.end() ? 0 : info->second.array_stride;
+        return constant(t.count) * (stride ? stride : size_of(t.element));
+    }
+    case OpTypeStruct: {
+        uint32_t size = 0;
+        for (uint32_t i = 0; i < t.members.size() && info != ids_.end() && i < info->second.members.size(); ++i) {
+            const MemberInfo& m = info->second.members[i];
+            size = std::max(size, m.offset + size_of(t.members[i], m.matrix_stride));
         }
-        case OpTypeStruct: {
-            uint32_t size = 0;
-            for (uint32_t i = 0; i < t.members.size() && info != ids_.end() && i < info->second.members.size(); ++i) {
-                const MemberInfo& m = info->second.members[i];
-                size = std::max(size, m.offset + size_of(t.members[i], m.matrix_stride));
-            }
-            return size;
-        }
-        default: return 0;
+        return size;
+    }
+    default:
+        return 0;
     }
 }
 
@@ -360,47 +433,56 @@ uint32_t Reader::size_of(uint32_t type_id, uint32_t matrix_stride) const {
 uint32_t Reader::packed_size_of(uint32_t type_id) const {
     const Type& t = type(type_id);
     switch (t.op) {
-        case OpTypeBool:
-        case OpTypeInt:
-        case OpTypeFloat: return t.width / 8;
-        case OpTypeVector:
-        case OpTypeMatrix: return t.count * packed_size_of(t.element);
-        case OpTypeArray: return constant(t.count) * packed_size_of(t.element);
-        case OpTypeStruct: {
-            uint32_t size = 0;
-            for (const uint32_t member : t.members) size += packed_size_of(member);
-            return size;
-        }
-        default: return 0;
+    case OpTypeBool:
+    case OpTypeInt:
+    case OpTypeFloat:
+        return t.width / 8;
+    case OpTypeVector:
+    case OpTypeMatrix:
+        return t.count * packed_size_of(t.element);
+    case OpTypeArray:
+        return constant(t.count) * packed_size_of(t.element);
+    case OpTypeStruct: {
+        uint32_t size = 0;
+        for (const uint32_t member : t.members) size += packed_size_of(member);
+        return size;
+    }
+    default:
+        return 0;
     }
 }
 
 std::string Reader::type_name(uint32_t type_id) const {
     const Type& t = type(type_id);
     switch (t.op) {
-        case OpTypeBool: return "bool";
-        case OpTypeInt: {
-            const std::string base = t.is_signed ? "int" : "uint";
-            return t.width == 32 ? base : base + std::to_string(t.width) + "_t";
-        }
-        case OpTypeFloat: return t.width == 32 ? "float" : t.width == 64 ? "double" : "float16_t";
-        case OpTypeVector: {
-            const Type& e = type(t.element);
-            const std::string prefix = e.op == OpTypeInt ? (e.is_signed ? "i" : "u") : e.op == OpTypeBool ? "b" : "";
-            return prefix + "vec" + std::to_string(t.count);
-        }
-        case OpTypeMatrix: {
-            const uint32_t rows = type(t.element).count;
-            return "mat" + std::to_string(t.count) + (rows == t.count ? "" : "x" + std::to_string(rows));
-        }
-        case OpTypeArray:
-        case OpTypeRuntimeArray: return type_name(t.element);
-        case OpTypeStruct: {
-            const auto info = ids_.find(type_id);
-            return "struct " + (info == ids_.end() ? std::string() : info->second.name);
-        }
-        case OpTypePointer: return "pointer";
-        default: return "?";
+    case OpTypeBool:
+        return "bool";
+    case OpTypeInt: {
+        const std::string base = t.is_signed ? "int" : "uint";
+        return t.width == 32 ? base : base + std::to_string(t.width) + "_t";
+    }
+    case OpTypeFloat:
+        return t.width == 32 ? "float" : t.width == 64 ? "double" : "float16_t";
+    case OpTypeVector: {
+        const Type& e = type(t.element);
+        const std::string prefix = e.op == OpTypeInt ? (e.is_signed ? "i" : "u") : e.op == OpTypeBool ? "b" : "";
+        return prefix + "vec" + std::to_string(t.count);
+    }
+    case OpTypeMatrix: {
+        const uint32_t rows = type(t.element).count;
+        return "mat" + std::to_string(t.count) + (rows == t.count ? "" : "x" + std::to_string(rows));
+    }
+    case OpTypeArray:
+    case OpTypeRuntimeArray:
+        return type_name(t.element);
+    case OpTypeStruct: {
+        const auto info = ids_.find(type_id);
+        return "struct " + (info == ids_.end() ? std::string() : info->second.name);
+    }
+    case OpTypePointer:
+        return "pointer";
+    default:
+        return "?";
     }
 }
 
@@ -466,12 +548,14 @@ void Reader::finish_binding(const Variable& variable, const Type& pointer, const
         const bool storage = variable.storage_class == StorageBuffer || block->second.buffer_block;
         const auto& members = block->second.members;
         const auto all = [&](bool MemberInfo::*flag) {
-            return !members.empty() && std::all_of(members.begin(), members.end(), [&](const MemberInfo& m) { return m.*flag; });
+            return !members.empty() &&
+                   std::all_of(members.begin(), members.end(), [&](const MemberInfo& m) { return m.*flag; });
         };
         const bool read_only = info.non_writable || all(&MemberInfo::non_writable);
         b.write_only = storage && (info.non_readable || all(&MemberInfo::non_readable));
-        b.kind = !storage ? BindingKind::UniformBuffer
-                          : read_only ? BindingKind::StorageBufferReadOnly : BindingKind::StorageBuffer;
+        b.kind = !storage    ? BindingKind::UniformBuffer
+                 : read_only ? BindingKind::StorageBufferReadOnly
+                             : BindingKind::StorageBuffer;
         if (b.name.empty()) b.name = block->second.name;
         b.block_size = size_of(inner_id);
         b.members = members_of(inner_id);
@@ -485,7 +569,9 @@ void Reader::finish_binding(const Variable& variable, const Type& pointer, const
         b.dimension = inner.dim == 0   ? Dimension::D1
                       : inner.dim == 2 ? Dimension::D3
                                        : (inner.arrayed ? Dimension::D2Array : Dimension::D2);
-        b.sample_type = texel.op == OpTypeInt ? SampleType::Uint : inner.is_depth ? SampleType::Depth : SampleType::Float;
+        b.sample_type = texel.op == OpTypeInt ? SampleType::Uint
+                        : inner.is_depth      ? SampleType::Depth
+                                              : SampleType::Float;
     } else if (inner.op == OpTypeSampler) {
         b.kind = BindingKind::Sampler;
     } else if (inner.op == OpTypeSampledImage) {

@@ -10,11 +10,11 @@ namespace kiln::rhi {
 
 // One member of a block, or of a struct inside one.
 struct BlockMember {
-    std::string name = {};         // empty when the module carries no names; nested members are "outer.inner"
-    std::string type = {};         // "float", "uint", "int", "vec4", "uvec2", "mat4", "struct Name"
-    uint32_t offset = 0;      // bytes from the block's (array element's) start
-    uint32_t size = 0;        // bytes; 0 for a runtime array
-    uint32_t array_count = 0; // 0: not an array; kRemaining: runtime array
+    std::string name = {};     // empty when the module carries no names; nested members are "outer.inner"
+    std::string type = {};     // "float", "uint", "int", "vec4", "uvec2", "mat4", "struct Name"
+    uint32_t offset = 0;       // bytes from the block's (array element's) start
+    uint32_t size = 0;         // bytes; 0 for a runtime array
+    uint32_t array_count = 0;  // 0: not an array; kRemaining: runtime array
     uint32_t array_stride = 0;
     uint32_t matrix_stride = 0;
     std::vector<BlockMember> members = {};  // of a struct (of an array's element), offsets relative to the struct
@@ -29,9 +29,9 @@ struct ReflectedBinding {
     Format format = Format::Undefined;  // storage textures
     Dimension dimension = Dimension::D2;
     SampleType sample_type = SampleType::Float;
-    bool write_only = false;   // StorageTexture, StorageBuffer: the shader declares it never reads
-    uint32_t array_count = 1;  // kRemaining: runtime array (bindless)
-    uint32_t block_size = 0;   // bytes of a buffer's fixed part
+    bool write_only = false;                // StorageTexture, StorageBuffer: the shader declares it never reads
+    uint32_t array_count = 1;               // kRemaining: runtime array (bindless)
+    uint32_t block_size = 0;                // bytes of a buffer's fixed part
     std::vector<BlockMember> members = {};  // of a buffer block
 };
 

@@ -44,7 +44,8 @@ inline RowLayout row_layout(Format format, Extent size, uint32_t bytes_per_row, 
     out.bytes_per_row = bytes_per_row ? bytes_per_row : tight;
     out.bytes_per_layer = out.bytes_per_row * (rows_per_layer ? rows_per_layer : size.height);
     const bool empty = size.width == 0 || size.height == 0 || size.depth == 0;
-    out.total_bytes = empty ? 0 : out.bytes_per_layer * (size.depth - 1) + out.bytes_per_row * (size.height - 1) + tight;
+    out.total_bytes =
+        empty ? 0 : out.bytes_per_layer * (size.depth - 1) + out.bytes_per_row * (size.height - 1) + tight;
     return out;
 }
 

@@ -44,11 +44,11 @@ using QuerySet = Handle<struct QuerySetTag>;
 using SubmitId = uint64_t;
 
 // A set of enumerators that are single bits.
-#define KILN_RHI_BITS(T)                                                                                              \
-    constexpr T operator|(T a, T b) { return T(uint32_t(a) | uint32_t(b)); }                                          \
-    constexpr T operator&(T a, T b) { return T(uint32_t(a) & uint32_t(b)); }                                          \
-    constexpr T operator~(T a) { return T(~uint32_t(a)); }                                                            \
-    constexpr T& operator|=(T& a, T b) { return a = a | b; }                                                          \
+#define KILN_RHI_BITS(T)                                                     \
+    constexpr T operator|(T a, T b) { return T(uint32_t(a) | uint32_t(b)); } \
+    constexpr T operator&(T a, T b) { return T(uint32_t(a) & uint32_t(b)); } \
+    constexpr T operator~(T a) { return T(~uint32_t(a)); }                   \
+    constexpr T& operator|=(T& a, T b) { return a = a | b; }                 \
     constexpr bool any(T a) { return uint32_t(a) != 0; }
 
 // How commands touch a buffer or a range of texture subresources. Synchronisation and texture layouts follow from it.
@@ -194,12 +194,12 @@ struct SamplerDesc {
 
 enum class BindingKind : uint8_t {
     UniformBuffer,
-    StorageBuffer,         // read and write
-    StorageBufferReadOnly, // `readonly buffer` in GLSL
-    SampledTexture,        // `texture2D`, `texture3D`, `utexture2D` …; textures and samplers are always separate
+    StorageBuffer,          // read and write
+    StorageBufferReadOnly,  // `readonly buffer` in GLSL
+    SampledTexture,         // `texture2D`, `texture3D`, `utexture2D` …; textures and samplers are always separate
     Sampler,
-    StorageTexture,        // `image3D` with an explicit format; written (and read, if the shader does)
-    StorageTextureReadOnly, // `readonly image3D`
+    StorageTexture,          // `image3D` with an explicit format; written (and read, if the shader does)
+    StorageTextureReadOnly,  // `readonly image3D`
 };
 std::string_view name(BindingKind kind);
 
@@ -207,10 +207,10 @@ struct BindGroupLayoutEntry {
     uint32_t binding = 0;
     BindingKind kind = BindingKind::StorageBuffer;
     ShaderStage stages = ShaderStage::Compute;
-    Format format = Format::Undefined;  // storage textures: the format the shader declares
-    Dimension dimension = Dimension::D2;  // textures
+    Format format = Format::Undefined;           // storage textures: the format the shader declares
+    Dimension dimension = Dimension::D2;         // textures
     SampleType sample_type = SampleType::Float;  // SampledTexture; Float also accepts Depth32Float
-    bool dynamic_offset = false;  // buffers: offset given at set_bind_group
+    bool dynamic_offset = false;                 // buffers: offset given at set_bind_group
     friend bool operator==(const BindGroupLayoutEntry&, const BindGroupLayoutEntry&) = default;
 };
 
@@ -282,7 +282,16 @@ struct VertexBufferLayout {
 enum class Topology : uint8_t { TriangleList, TriangleStrip, LineList, LineStrip, PointList };
 enum class Cull : uint8_t { None, Front, Back };
 
-enum class BlendFactor : uint8_t { Zero, One, SrcAlpha, OneMinusSrcAlpha, DstAlpha, OneMinusDstAlpha, SrcColor, DstColor };
+enum class BlendFactor : uint8_t {
+    Zero,
+    One,
+    SrcAlpha,
+    OneMinusSrcAlpha,
+    DstAlpha,
+    OneMinusDstAlpha,
+    SrcColor,
+    DstColor
+};
 enum class BlendOp : uint8_t { Add, Subtract, ReverseSubtract, Min, Max };
 
 struct BlendComponent {
@@ -388,13 +397,13 @@ struct DeviceInfo {
 };
 
 struct MemoryStats {
-    uint64_t device_bytes = 0;   // reserved from the driver, by kind of memory
+    uint64_t device_bytes = 0;  // reserved from the driver, by kind of memory
     uint64_t upload_bytes = 0;
     uint64_t readback_bytes = 0;
-    uint64_t used_bytes = 0;     // handed out to live resources
+    uint64_t used_bytes = 0;  // handed out to live resources
     uint64_t peak_used_bytes = 0;
-    uint32_t blocks = 0;         // driver allocations
-    uint32_t resources = 0;      // live buffers and textures
+    uint32_t blocks = 0;     // driver allocations
+    uint32_t resources = 0;  // live buffers and textures
 };
 
 #undef KILN_RHI_BITS

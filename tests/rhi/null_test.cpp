@@ -9,10 +9,12 @@ namespace kiln::rhi {
 TEST_F(NullTest, BytesTravelThroughBuffersAndTextures) {
     Device& d = *device_;
     const BufferHandle a = must(d.create_buffer({.size = 1024, .label = "a"}));
-    const TextureHandle v = must(d.create_texture({.dimension = Dimension::D3, .format = Format::R16Uint, .size = {4, 3, 2}, .label = "v"}));
-    const TextureHandle w = must(d.create_texture({.dimension = Dimension::D3, .format = Format::R16Uint, .size = {4, 3, 2}, .label = "w"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = 1024, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const TextureHandle v = must(
+        d.create_texture({.dimension = Dimension::D3, .format = Format::R16Uint, .size = {4, 3, 2}, .label = "v"}));
+    const TextureHandle w = must(
+        d.create_texture({.dimension = Dimension::D3, .format = Format::R16Uint, .size = {4, 3, 2}, .label = "w"}));
+    const BufferHandle back = must(d.create_buffer(
+        {.size = 1024, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     std::vector<uint16_t> texels(24);
     for (uint16_t i = 0; i < 24; ++i) texels[i] = uint16_t(1000 + i);
     must(d.write_buffer(a, 32, bytes_of(texels)));
@@ -30,7 +32,8 @@ TEST_F(NullTest, BytesTravelThroughBuffersAndTextures) {
     must(d.wait(must(d.submit(std::move(e)))));
     const std::vector<uint16_t> seen = mapped<uint16_t>(d, back, 24);
     // Slice 1 of v begins at 1012; its texel (1, 0) goes to (0, 1) of w.
-    const std::vector<uint16_t> expected{9, 9, 9, 9, 0, 0, 0, 0, 1013, 1014, 9, 9, 0, 0, 0, 0, 1017, 1018, 9, 9, 0, 0, 0, 0};
+    const std::vector<uint16_t> expected{9, 9, 9, 9, 0,    0,    0, 0, 1013, 1014, 9, 9,
+                                         0, 0, 0, 0, 1017, 1018, 9, 9, 0,    0,    0, 0};
     EXPECT_EQ(seen, expected);
     for (const BufferHandle b : {a, back}) d.destroy(b);
     d.destroy(v);
@@ -44,7 +47,8 @@ TEST_F(NullTest, TraceReadsLikeTheFrame) {
     const ShaderModule shader = must(d.create_shader_module({.spirv = kRhiAddSpv, .label = "add"}));
     const ComputePipeline p = must(d.create_compute_pipeline({.shader = shader, .label = "add"}));
     const BindGroupEntry entries[] = {{.binding = 0, .buffer = in}, {.binding = 1, .buffer = out}};
-    const BindGroup g = must(d.create_bind_group({.layout = d.group_layout(p, 0), .entries = entries, .label = "in out"}));
+    const BindGroup g =
+        must(d.create_bind_group({.layout = d.group_layout(p, 0), .entries = entries, .label = "in out"}));
     const std::string before = d.trace();
     auto e = d.create_encoder("frame");
     ComputePass& pass = e->begin_compute("add");
@@ -53,7 +57,8 @@ TEST_F(NullTest, TraceReadsLikeTheFrame) {
     pass.set_push_struct(std::array<uint32_t, 4>{});
     pass.dispatch(4);
     pass.end();
-    barrier(*e, {.buffer = out, .before = Access::StorageWriteCompute, .after = Access::CopyRead | Access::UniformRead});
+    barrier(*e,
+            {.buffer = out, .before = Access::StorageWriteCompute, .after = Access::CopyRead | Access::UniformRead});
     EXPECT_FALSE(d.submit(std::move(e)));  // no Uniform usage: refused
     e = d.create_encoder("frame");
     ComputePass& again = e->begin_compute("add");
@@ -62,7 +67,9 @@ TEST_F(NullTest, TraceReadsLikeTheFrame) {
     again.set_push_struct(std::array<uint32_t, 4>{});
     again.dispatch(4);
     again.end();
-    barrier(*e, {.buffer = out, .before = Access::StorageWriteCompute, .after = Access::CopyRead | Access::StorageReadCompute});
+    barrier(
+        *e,
+        {.buffer = out, .before = Access::StorageWriteCompute, .after = Access::CopyRead | Access::StorageReadCompute});
     must(d.submit(std::move(e)));
     EXPECT_TRUE(complained("lacks the usage for UniformRead"));
     EXPECT_EQ(d.trace().substr(before.size()),

@@ -78,7 +78,8 @@ TEST_F(PipelineCacheGpu, DamagedFilesAreIgnoredAndReplaced) {
     flipped[flipped.size() - 3] = char(flipped[flipped.size() - 3] ^ 4);
     std::string grown = good;
     grown[8] = char(0xff);  // size
-    for (const std::string& bad : {good.substr(0, good.size() / 2), flipped, grown, std::string(), std::string(5000, 'x'), good + "x"}) {
+    for (const std::string& bad :
+         {good.substr(0, good.size() / 2), flipped, grown, std::string(), std::string(5000, 'x'), good + "x"}) {
         std::ofstream(path, std::ios::binary | std::ios::trunc) << bad;
         EXPECT_TRUE(vulkan::load_cache(path.string()).empty());
         make_a_pipeline_and_quit();

@@ -117,7 +117,8 @@ TEST(SpirvReflect, SurvivesDamagedModules) {
     for (int i = 0; i < 2000; ++i) {
         std::vector<uint32_t> words = whole;
         words.resize(5 + random() % (words.size() - 5));
-        for (int k = 0; k < 4; ++k) words[5 + random() % std::max<size_t>(1, words.size() - 5) % words.size()] = random() % 512;
+        for (int k = 0; k < 4; ++k)
+            words[5 + random() % std::max<size_t>(1, words.size() - 5) % words.size()] = random() % 512;
         refused += reflect_spirv(words) ? 0 : 1;
     }
     EXPECT_GT(refused, 0);
@@ -133,8 +134,8 @@ TEST(Floor, SaysWhatIsBeyondIt) {
     for (uint32_t i = 0; i < 7; ++i) r.bindings.push_back({.set = 0, .binding = 10 + i, .name = "extra"});
     EXPECT_THAT(check_floor(r),
                 testing::ElementsAre("storage buffers: 9, the floor is 8", "bytes of push data: 68, the floor is 64",
-                                     "threads a workgroup: 512, the floor is 256", "bytes of workgroup memory: 16385, the floor is 16384",
-                                     "needs Float64"));
+                                     "threads a workgroup: 512, the floor is 256",
+                                     "bytes of workgroup memory: 16385, the floor is 16384", "needs Float64"));
 }
 
 TEST(Floor, HalfFloatStorageIsATier) {
@@ -145,9 +146,15 @@ TEST(Floor, HalfFloatStorageIsATier) {
 
 TEST(Floor, StagesOfOnePipelineShareTheirEntries) {
     Reflection vertex, fragment;
-    vertex.bindings = {{.set = 1, .binding = 0, .name = "camera", .kind = BindingKind::UniformBuffer, .stages = ShaderStage::Vertex}};
-    fragment.bindings = {{.set = 1, .binding = 2, .name = "light", .kind = BindingKind::UniformBuffer, .stages = ShaderStage::Fragment},
-                         {.set = 1, .binding = 0, .name = "camera", .kind = BindingKind::UniformBuffer, .stages = ShaderStage::Fragment}};
+    vertex.bindings = {
+        {.set = 1, .binding = 0, .name = "camera", .kind = BindingKind::UniformBuffer, .stages = ShaderStage::Vertex}};
+    fragment.bindings = {
+        {.set = 1, .binding = 2, .name = "light", .kind = BindingKind::UniformBuffer, .stages = ShaderStage::Fragment},
+        {.set = 1,
+         .binding = 0,
+         .name = "camera",
+         .kind = BindingKind::UniformBuffer,
+         .stages = ShaderStage::Fragment}};
     const Reflection* const both[] = {&vertex, &fragment};
     const auto entries = layout_entries(both, 1);
     ASSERT_TRUE(entries);

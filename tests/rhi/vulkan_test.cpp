@@ -26,13 +26,14 @@ TEST_F(VulkanGpu, ComputeComesBackRight) {
     for (uint32_t i = 0; i < kCount; ++i) input[i] = i * 7;
     const BufferHandle in = must(d.create_buffer({.size = kCount * 4, .label = "in"}));
     const BufferHandle out = must(d.create_buffer({.size = kCount * 4, .label = "out"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = kCount * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle back = must(d.create_buffer(
+        {.size = kCount * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     const ShaderModule shader = must(d.create_shader_module({.spirv = kRhiAddSpv, .label = "add"}));
     const ComputePipeline pipeline = must(d.create_compute_pipeline({.shader = shader, .label = "add"}));
     d.destroy(shader);
     const BindGroupEntry entries[] = {{.binding = 0, .buffer = in}, {.binding = 1, .buffer = out}};
-    const BindGroup group = must(d.create_bind_group({.layout = d.group_layout(pipeline, 0), .entries = entries, .label = "add"}));
+    const BindGroup group =
+        must(d.create_bind_group({.layout = d.group_layout(pipeline, 0), .entries = entries, .label = "add"}));
 
     must(d.write_buffer(in, 0, bytes_of(input)));
     auto e = d.create_encoder("add");
@@ -63,7 +64,8 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
     Device& d = *device_;
     if (!d.caps().storage_r16f) GTEST_SKIP() << "no storage textures of R16Float";
     const Extent size{20, 12, 8};
-    const TextureHandle volume = must(d.create_texture({.dimension = Dimension::D3, .format = Format::R16Float, .size = size, .label = "volume"}));
+    const TextureHandle volume = must(
+        d.create_texture({.dimension = Dimension::D3, .format = Format::R16Float, .size = size, .label = "volume"}));
     const BufferHandle back = must(d.create_buffer({.size = size.width * size.height * size.depth * 2,
                                                     .usage = BufferUsage::CopyDst,
                                                     .memory = MemoryKind::Readback,
@@ -84,8 +86,8 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
     }
     const BufferHandle at = must(d.create_buffer({.size = places.size() * 16, .label = "places"}));
     const BufferHandle values = must(d.create_buffer({.size = places.size() * 4, .label = "values"}));
-    const BufferHandle values_back = must(
-        d.create_buffer({.size = places.size() * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "values"}));
+    const BufferHandle values_back = must(d.create_buffer(
+        {.size = places.size() * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "values"}));
     must(d.write_buffer(at, 0, bytes_of(places)));
 
     const BindGroupEntry write_entries[] = {{.binding = 0, .view = d.whole_view(volume)}};
@@ -93,8 +95,10 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
                                              {.binding = 1, .sampler = smooth},
                                              {.binding = 2, .buffer = at},
                                              {.binding = 3, .buffer = values}};
-    const BindGroup write_group = must(d.create_bind_group({.layout = d.group_layout(writer, 0), .entries = write_entries}));
-    const BindGroup sample_group = must(d.create_bind_group({.layout = d.group_layout(sampler_pipeline, 0), .entries = sample_entries}));
+    const BindGroup write_group =
+        must(d.create_bind_group({.layout = d.group_layout(writer, 0), .entries = write_entries}));
+    const BindGroup sample_group =
+        must(d.create_bind_group({.layout = d.group_layout(sampler_pipeline, 0), .entries = sample_entries}));
 
     auto e = d.create_encoder("volume");
     barrier(*e, {.texture = volume, .after = Access::StorageWriteCompute});
@@ -103,7 +107,9 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
     w.set_bind_group(0, write_group);
     w.dispatch(5, 3, 2);
     w.end();
-    barrier(*e, {.texture = volume, .before = Access::StorageWriteCompute, .after = Access::SampledReadCompute | Access::CopyRead});
+    barrier(*e, {.texture = volume,
+                 .before = Access::StorageWriteCompute,
+                 .after = Access::SampledReadCompute | Access::CopyRead});
     ComputePass& s = e->begin_compute("sample");
     s.set_pipeline(sampler_pipeline);
     s.set_bind_group(0, sample_group);
@@ -135,22 +141,27 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
 
 TEST_F(VulkanGpu, TextureCopiesMoveEveryMipAndLayer) {
     Device& d = *device_;
-    const TextureDesc desc{.dimension = Dimension::D2Array, .format = Format::Rgba8Unorm, .size = {8, 8, 3}, .mips = 2, .label = "a"};
+    const TextureDesc desc{
+        .dimension = Dimension::D2Array, .format = Format::Rgba8Unorm, .size = {8, 8, 3}, .mips = 2, .label = "a"};
     const TextureHandle a = must(d.create_texture(desc));
     TextureDesc other = desc;
     other.label = "b";
     const TextureHandle b = must(d.create_texture(other));
-    const BufferHandle back =
-        must(d.create_buffer({.size = 3 * 4 * 4 * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle back = must(d.create_buffer(
+        {.size = 3 * 4 * 4 * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     std::vector<std::vector<uint32_t>> texels(3);
     for (uint32_t layer = 0; layer < 3; ++layer) {
         for (uint32_t i = 0; i < 16; ++i) texels[layer].push_back(layer << 8 | i);
-        must(d.write_texture({.place = {a, 1, {0, 0, layer}}, .size = {4, 4}, .after = Access::CopyRead}, bytes_of(texels[layer])));
+        must(d.write_texture({.place = {a, 1, {0, 0, layer}}, .size = {4, 4}, .after = Access::CopyRead},
+                             bytes_of(texels[layer])));
     }
     auto e = d.create_encoder("copies");
     barrier(*e, {.texture = b, .after = Access::CopyWrite});
     e->copy_texture({a, 1, {}}, {b, 1, {}}, {4, 4, 3});
-    barrier(*e, {.texture = b, .range = {.base_mip = 1, .mip_count = 1}, .before = Access::CopyWrite, .after = Access::CopyRead});
+    barrier(*e, {.texture = b,
+                 .range = {.base_mip = 1, .mip_count = 1},
+                 .before = Access::CopyWrite,
+                 .after = Access::CopyRead});
     e->copy_texture_to_buffer({b, 1, {}}, {.buffer = back}, {4, 4, 3});
     barrier(*e, {.buffer = back, .before = Access::CopyWrite, .after = Access::HostRead});
     must(d.wait(must(d.submit(std::move(e)))));
@@ -166,8 +177,8 @@ TEST_F(VulkanGpu, ClearsAndOddRowsArriveAsAsked) {
     Device& d = *device_;
     const TextureHandle t = must(d.create_texture({.format = Format::R32Uint, .size = {5, 3}, .label = "odd"}));
     const BufferHandle source = must(d.create_buffer({.size = 256, .label = "source"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = 256, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle back = must(
+        d.create_buffer({.size = 256, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     auto e = d.create_encoder("clears");
     e->clear_buffer(source, 0, kWholeSize, 0x01020304);
     barrier(*e, {.texture = t, .after = Access::CopyWrite});
@@ -193,8 +204,8 @@ TEST_F(VulkanGpu, ClearsAndOddRowsArriveAsAsked) {
 TEST_F(VulkanGpu, LaterWritesOfOneFrameWin) {
     Device& d = *device_;
     const BufferHandle b = must(d.create_buffer({.size = 64, .label = "b"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = 64, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle back = must(
+        d.create_buffer({.size = 64, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     must(d.write_buffer(b, 0, bytes_of(std::vector<uint32_t>(16, 1))));
     must(d.write_buffer(b, 16, bytes_of(std::vector<uint32_t>(4, 2))));
     must(d.write_buffer(b, 20, bytes_of(std::vector<uint32_t>(1, 3))));
@@ -213,9 +224,10 @@ TEST_F(VulkanGpu, TimestampsRiseAndStayInsideTheWait) {
     if (!d.caps().timestamp) GTEST_SKIP() << "no timestamps";
     const QuerySet set = must(d.create_query_set({.count = 4, .label = "times"}));
     const BufferHandle big = must(d.create_buffer({.size = 8 << 20, .label = "big"}));
-    const BufferHandle ticks = must(d.create_buffer({.size = 32, .usage = BufferUsage::QueryResolve | BufferUsage::CopySrc, .label = "ticks"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = 32, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle ticks = must(
+        d.create_buffer({.size = 32, .usage = BufferUsage::QueryResolve | BufferUsage::CopySrc, .label = "ticks"}));
+    const BufferHandle back = must(
+        d.create_buffer({.size = 32, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     for (int frame = 0; frame < 2; ++frame) {
         auto e = d.create_encoder("times");
         if (frame > 0) {
@@ -262,23 +274,28 @@ TEST_F(VulkanGpu, TriangleStandsUprightInItsCorner) {
                                                                    .depth = {.format = Format::Depth32Float},
                                                                    .label = "triangle"}));
     const uint32_t n = 16;
-    const TextureHandle color = must(d.create_texture(
-        {.format = Format::Rgba8Unorm, .size = {n, n}, .usage = TextureUsage::Color | TextureUsage::CopySrc, .label = "color"}));
-    const TextureHandle depth = must(
-        d.create_texture({.format = Format::Depth32Float, .size = {n, n}, .usage = TextureUsage::Depth | TextureUsage::CopySrc, .label = "depth"}));
-    const BufferHandle points = must(
-        d.create_buffer({.size = sizeof(Vertex) * 3, .usage = BufferUsage::Vertex | BufferUsage::CopyDst, .label = "vertices"}));
-    const BufferHandle back =
-        must(d.create_buffer({.size = n * n * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
-    const BufferHandle depth_back =
-        must(d.create_buffer({.size = n * n * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "depth back"}));
+    const TextureHandle color = must(d.create_texture({.format = Format::Rgba8Unorm,
+                                                       .size = {n, n},
+                                                       .usage = TextureUsage::Color | TextureUsage::CopySrc,
+                                                       .label = "color"}));
+    const TextureHandle depth = must(d.create_texture({.format = Format::Depth32Float,
+                                                       .size = {n, n},
+                                                       .usage = TextureUsage::Depth | TextureUsage::CopySrc,
+                                                       .label = "depth"}));
+    const BufferHandle points = must(d.create_buffer(
+        {.size = sizeof(Vertex) * 3, .usage = BufferUsage::Vertex | BufferUsage::CopyDst, .label = "vertices"}));
+    const BufferHandle back = must(d.create_buffer(
+        {.size = n * n * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle depth_back = must(d.create_buffer(
+        {.size = n * n * 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "depth back"}));
     must(d.write_buffer(points, 0, bytes_of(vertices)));
 
     auto e = d.create_encoder("triangle");
     barrier(*e, {.texture = color, .after = Access::ColorWrite});
     barrier(*e, {.texture = depth, .after = Access::DepthWrite});
     const ColorAttachment attachments[] = {{.view = d.whole_view(color), .clear = {0, 0, 1, 1}}};
-    RenderPass& pass = e->begin_render({.colors = attachments, .depth = {.view = d.whole_view(depth)}, .label = "triangle"});
+    RenderPass& pass =
+        e->begin_render({.colors = attachments, .depth = {.view = d.whole_view(depth)}, .label = "triangle"});
     pass.set_pipeline(pipeline);
     pass.set_vertex_buffer(0, points);
     pass.set_push_struct(1.0f);
@@ -296,7 +313,7 @@ TEST_F(VulkanGpu, TriangleStandsUprightInItsCorner) {
     const std::vector<float> depths = mapped<float>(d, depth_back, n * n);
     for (uint32_t y = 0; y < n; ++y)
         for (uint32_t x = 0; x < n; ++x) {
-            if (x == y) continue;  // the long edge
+            if (x == y) continue;       // the long edge
             const bool inside = x < y;  // row 0 is the top: the lower left half
             EXPECT_EQ(pixels[y * n + x], inside ? 0xff0000ffu : 0xffff0000u) << x << " " << y;
             EXPECT_EQ(depths[y * n + x], inside ? 0.5f : 0.0f) << x << " " << y;
@@ -313,7 +330,8 @@ TEST_F(VulkanGpu, MemoryComesBackAndTooMuchIsAnError) {
     Device& d = *device_;
     const uint64_t before = d.memory_stats().used_bytes;
     std::vector<BufferHandle> buffers;
-    for (int i = 0; i < 300; ++i) buffers.push_back(must(d.create_buffer({.size = 10000 + uint64_t(i) * 1000, .label = "many"})));
+    for (int i = 0; i < 300; ++i)
+        buffers.push_back(must(d.create_buffer({.size = 10000 + uint64_t(i) * 1000, .label = "many"})));
     EXPECT_LE(d.memory_stats().blocks, 8u);
     EXPECT_GE(d.memory_stats().used_bytes, before + 300 * 10000);
     Result<BufferHandle> huge = d.create_buffer({.size = 1ull << 50, .label = "huge"});
@@ -323,7 +341,8 @@ TEST_F(VulkanGpu, MemoryComesBackAndTooMuchIsAnError) {
     std::vector<BufferHandle> large;
     Error last;
     for (int i = 0; i < 4096 && last.message.empty(); ++i) {
-        Result<BufferHandle> b = d.create_buffer({.size = std::min<uint64_t>(1ull << 30, d.limits().max_buffer), .label = "large"});
+        Result<BufferHandle> b =
+            d.create_buffer({.size = std::min<uint64_t>(1ull << 30, d.limits().max_buffer), .label = "large"});
         if (b) {
             large.push_back(*b);
         } else {

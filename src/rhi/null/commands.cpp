@@ -22,7 +22,8 @@ std::string range_text(const TextureDesc& d, const Subresources& given) {
     const Subresources r = resolved(d, given);
     std::string out;
     if (r.base_mip != 0 || r.mip_count != d.mips) out += " mips " + number(r.base_mip) + "+" + number(r.mip_count);
-    if (r.base_layer != 0 || r.layer_count != layer_count(d)) out += " layers " + number(r.base_layer) + "+" + number(r.layer_count);
+    if (r.base_layer != 0 || r.layer_count != layer_count(d))
+        out += " layers " + number(r.base_layer) + "+" + number(r.layer_count);
     return out;
 }
 
@@ -40,28 +41,43 @@ uint16_t to_half(float f) {
 // Bytes of one texel of a clear colour.
 std::array<std::byte, 16> texel(Format format, const std::array<float, 4>& v) {
     std::array<std::byte, 16> out{};
-    const auto put = [&](auto value, uint32_t at) { std::memcpy(out.data() + at * sizeof value, &value, sizeof value); };
+    const auto put = [&](auto value, uint32_t at) {
+        std::memcpy(out.data() + at * sizeof value, &value, sizeof value);
+    };
     for (uint32_t i = 0; i < info(format).channels; ++i) {
         switch (format) {
-            case Format::R8Snorm: put(int8_t(std::lround(std::clamp(v[i], -1.0f, 1.0f) * 127.0f)), i); break;
-            case Format::Rgba8Unorm: put(uint8_t(std::lround(std::clamp(v[i], 0.0f, 1.0f) * 255.0f)), i); break;
-            case Format::R16Uint: put(uint16_t(std::lround(v[i])), i); break;
-            case Format::R16Float:
-            case Format::Rg16Float:
-            case Format::Rgba16Float: put(to_half(v[i]), i); break;
-            case Format::R32Uint:
-            case Format::Rg32Uint:
-            case Format::Rgba32Uint: put(uint32_t(std::llround(v[i])), i); break;
-            case Format::R32Float:
-            case Format::Rgba32Float:
-            case Format::Depth32Float: put(v[i], i); break;
-            case Format::R11g11b10Float: {
-                // Halves without sign and with their low mantissa bits cut off.
-                const auto h = [&](uint32_t c) { return v[c] > 0.0f ? uint32_t(to_half(v[c])) : 0u; };
-                put(h(0) >> 4 | (h(1) >> 4) << 11 | (h(2) >> 5) << 22, 0);
-                break;
-            }
-            case Format::Undefined: break;
+        case Format::R8Snorm:
+            put(int8_t(std::lround(std::clamp(v[i], -1.0f, 1.0f) * 127.0f)), i);
+            break;
+        case Format::Rgba8Unorm:
+            put(uint8_t(std::lround(std::clamp(v[i], 0.0f, 1.0f) * 255.0f)), i);
+            break;
+        case Format::R16Uint:
+            put(uint16_t(std::lround(v[i])), i);
+            break;
+        case Format::R16Float:
+        case Format::Rg16Float:
+        case Format::Rgba16Float:
+            put(to_half(v[i]), i);
+            break;
+        case Format::R32Uint:
+        case Format::Rg32Uint:
+        case Format::Rgba32Uint:
+            put(uint32_t(std::llround(v[i])), i);
+            break;
+        case Format::R32Float:
+        case Format::Rgba32Float:
+        case Format::Depth32Float:
+            put(v[i], i);
+            break;
+        case Format::R11g11b10Float: {
+            // Halves without sign and with their low mantissa bits cut off.
+            const auto h = [&](uint32_t c) { return v[c] > 0.0f ? uint32_t(to_half(v[c])) : 0u; };
+            put(h(0) >> 4 | (h(1) >> 4) << 11 | (h(2) >> 5) << 22, 0);
+            break;
+        }
+        case Format::Undefined:
+            break;
         }
     }
     return out;
@@ -77,7 +93,8 @@ void for_each_row(Texture& texture, const TexturePlace& place, Extent size, cons
         std::vector<std::byte>& bytes = NullDevice::bytes_of(texture, place.mip, volume ? 0 : place.origin.z + z);
         const uint64_t slice = volume ? place.origin.z + z : 0;
         for (uint32_t y = 0; y < size.height; ++y) {
-            const uint64_t at = ((slice * whole.height + place.origin.y + y) * whole.width + place.origin.x) * texel_bytes;
+            const uint64_t at =
+                ((slice * whole.height + place.origin.y + y) * whole.width + place.origin.x) * texel_bytes;
             const uint64_t length = size.width * texel_bytes;
             if (at + length <= bytes.size())
                 row(std::span(bytes).subspan(at, length), rows.bytes_per_layer * z + rows.bytes_per_row * y);
@@ -114,7 +131,8 @@ RenderPass& NullEncoder::begin_render(const RenderPassDesc& desc) {
     std::string text = "render '" + std::string(desc.label) + "'";
     for (const ColorAttachment& c : desc.colors) text += " color " + named(c.view) + load(c.load);
     if (desc.depth.view)
-        text += std::string(desc.depth.read_only ? " depth-read " : " depth ") + named(desc.depth.view) + load(desc.depth.load);
+        text += std::string(desc.depth.read_only ? " depth-read " : " depth ") + named(desc.depth.view) +
+                load(desc.depth.load);
     line(text);
     indent_ += 2;
     return *this;
@@ -125,8 +143,10 @@ void NullEncoder::end() {
     line("end");
 }
 
-void NullEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) {
-    line("copy " + named(src) + "+" + number(src_offset) + " -> " + named(dst) + "+" + number(dst_offset) + " " + number(size) + " B");
+void NullEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                              uint64_t size) {
+    line("copy " + named(src) + "+" + number(src_offset) + " -> " + named(dst) + "+" + number(dst_offset) + " " +
+         number(size) + " B");
     work_.push_back([=, this] {
         Buffer* from = device_.find(src);
         Buffer* to = device_.find(dst);
@@ -181,7 +201,8 @@ void NullEncoder::copy_texture(const TexturePlace& src, const TexturePlace& dst,
 }
 
 void NullEncoder::clear_buffer(BufferHandle buffer, uint64_t offset, uint64_t size, uint32_t word) {
-    line("clear " + named(buffer) + "+" + number(offset) + " " + (size == kWholeSize ? "all" : number(size) + " B") + " = " + number(word));
+    line("clear " + named(buffer) + "+" + number(offset) + " " + (size == kWholeSize ? "all" : number(size) + " B") +
+         " = " + number(word));
     work_.push_back([=, this] {
         Buffer* b = device_.find(buffer);
         if (!b || offset > b->bytes.size()) return;
@@ -192,8 +213,8 @@ void NullEncoder::clear_buffer(BufferHandle buffer, uint64_t offset, uint64_t si
 
 void NullEncoder::clear_texture(TextureHandle texture, std::array<float, 4> value, Subresources range) {
     const Texture* t = device_.find(texture);
-    line("clear " + named(texture) + (t ? range_text(t->desc, range) : "") + " = " + number(value[0]) + " " + number(value[1]) +
-         " " + number(value[2]) + " " + number(value[3]));
+    line("clear " + named(texture) + (t ? range_text(t->desc, range) : "") + " = " + number(value[0]) + " " +
+         number(value[1]) + " " + number(value[2]) + " " + number(value[3]));
     work_.push_back([=, this] {
         Texture* to = device_.find(texture);
         if (!to) return;
@@ -203,7 +224,8 @@ void NullEncoder::clear_texture(TextureHandle texture, std::array<float, 4> valu
         for (uint32_t layer = r.base_layer; layer < r.base_layer + r.layer_count; ++layer)
             for (uint32_t mip = r.base_mip; mip < r.base_mip + r.mip_count; ++mip) {
                 std::vector<std::byte>& bytes = NullDevice::bytes_of(*to, mip, layer);
-                for (size_t at = 0; at + step <= bytes.size(); at += step) std::memcpy(bytes.data() + at, pattern.data(), step);
+                for (size_t at = 0; at + step <= bytes.size(); at += step)
+                    std::memcpy(bytes.data() + at, pattern.data(), step);
             }
     });
 }
@@ -230,7 +252,8 @@ void NullEncoder::write_timestamp(QuerySet set, uint32_t index) {
 }
 
 void NullEncoder::resolve_queries(QuerySet set, uint32_t first, uint32_t count, BufferHandle dst, uint64_t offset) {
-    line("resolve " + named(set) + " " + number(first) + "+" + number(count) + " -> " + named(dst) + "+" + number(offset));
+    line("resolve " + named(set) + " " + number(first) + "+" + number(count) + " -> " + named(dst) + "+" +
+         number(offset));
     work_.push_back([=, this] {
         const Queries* q = device_.find(set);
         Buffer* to = device_.find(dst);
@@ -258,8 +281,8 @@ void NullEncoder::set_index_buffer(BufferHandle buffer, bool is_32_bit, uint64_t
     line("indices " + named(buffer) + "+" + number(offset) + (is_32_bit ? " u32" : " u16"));
 }
 void NullEncoder::set_viewport(float x, float y, float width, float height, float depth_min, float depth_max) {
-    line("viewport " + number(x) + " " + number(y) + " " + number(width) + " " + number(height) + " depth " + number(depth_min) +
-         ".." + number(depth_max));
+    line("viewport " + number(x) + " " + number(y) + " " + number(width) + " " + number(height) + " depth " +
+         number(depth_min) + ".." + number(depth_max));
 }
 void NullEncoder::set_scissor(uint32_t x, uint32_t y, uint32_t width, uint32_t height) {
     line("scissor " + number(x) + " " + number(y) + " " + number(width) + " " + number(height));
@@ -268,7 +291,8 @@ void NullEncoder::set_blend_constant(std::array<float, 4> c) {
     line("blend constant " + number(c[0]) + " " + number(c[1]) + " " + number(c[2]) + " " + number(c[3]));
 }
 void NullEncoder::draw(uint32_t vertices, uint32_t instances, uint32_t first_vertex, uint32_t first_instance) {
-    line("draw " + number(vertices) + " x" + number(instances) + " from " + number(first_vertex) + "," + number(first_instance));
+    line("draw " + number(vertices) + " x" + number(instances) + " from " + number(first_vertex) + "," +
+         number(first_instance));
 }
 void NullEncoder::draw_indexed(uint32_t indices, uint32_t instances, uint32_t first_index, int32_t base_vertex,
                                uint32_t first_instance) {
@@ -279,7 +303,8 @@ void NullEncoder::draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t d
     line("draw indirect " + named(buffer) + "+" + number(offset) + " x" + number(draws) + " stride " + number(stride));
 }
 void NullEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) {
-    line("draw indexed indirect " + named(buffer) + "+" + number(offset) + " x" + number(draws) + " stride " + number(stride));
+    line("draw indexed indirect " + named(buffer) + "+" + number(offset) + " x" + number(draws) + " stride " +
+         number(stride));
 }
 
 }  // namespace kiln::rhi::null

@@ -12,7 +12,8 @@ public:
 
     ComputePass& begin_compute(std::string_view label) override;
     RenderPass& begin_render(const RenderPassDesc& desc) override;
-    void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) override;
+    void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                     uint64_t size) override;
     void copy_buffer_to_texture(const BufferLayout& src, const TexturePlace& dst, Extent size) override;
     void copy_texture_to_buffer(const TexturePlace& src, const BufferLayout& dst, Extent size) override;
     void copy_texture(const TexturePlace& src, const TexturePlace& dst, Extent size) override;

@@ -70,13 +70,16 @@ Result<void> NullDevice::write_texture(const TextureWrite& write, std::span<cons
     if (!t) return Error{"write_texture: stale texture handle"};
     const RowLayout rows = row_layout(t->desc.format, write.size, write.bytes_per_row, write.rows_per_layer);
     if (bytes.size() < rows.total_bytes) return Error{"write_texture: too few bytes for '" + t->label + "'"};
-    const BufferHandle staging = buffers_.insert({.label = "staging", .desc = {}, .bytes = {bytes.begin(), bytes.end()}});
+    const BufferHandle staging =
+        buffers_.insert({.label = "staging", .desc = {}, .bytes = {bytes.begin(), bytes.end()}});
     NullEncoder encoder(*this, "write");
-    encoder.copy_buffer_to_texture({.buffer = staging, .bytes_per_row = write.bytes_per_row, .rows_per_layer = write.rows_per_layer},
-                                   write.place, write.size);
+    encoder.copy_buffer_to_texture(
+        {.buffer = staging, .bytes_per_row = write.bytes_per_row, .rows_per_layer = write.rows_per_layer}, write.place,
+        write.size);
     encoder.run();
     buffers_.remove(staging);
-    line("write '" + t->label + "' mip " + std::to_string(write.place.mip) + " " + name(write.before) + " -> " + name(write.after));
+    line("write '" + t->label + "' mip " + std::to_string(write.place.mip) + " " + name(write.before) + " -> " +
+         name(write.after));
     return {};
 }
 
@@ -126,8 +129,8 @@ MemoryStats NullDevice::memory_stats() const {
 }
 
 uint32_t NullDevice::live_handle_count() const {
-    uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() + groups_.size() +
-                     layouts_.size() + compute_.size() + render_.size() + queries_.size();
+    uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
+                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + queries_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;

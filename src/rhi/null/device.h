@@ -153,7 +153,8 @@ private:
         line("destroy " + std::string(kind) + " '" + gone->label + "'");
     }
     void line(const std::string& text) { trace_ += text + '\n'; }
-    Result<Pipeline> make_pipeline(std::span<const ShaderModule> shaders, PipelineLayout layout, std::string_view label);
+    Result<Pipeline> make_pipeline(std::span<const ShaderModule> shaders, PipelineLayout layout,
+                                   std::string_view label);
 
     DeviceInfo info_;
     Caps caps_;

@@ -53,8 +53,9 @@ Result<TextureHandle> NullDevice::create_texture(const TextureDesc& desc) {
     t.desc.label = {};
     t.desc.heap = {};
     t.subresources.resize(size_t{desc.mips} * layer_count(desc));
-    line("create texture '" + t.label + "' " + std::string(name(desc.format)) + " " + std::to_string(desc.size.width) + "x" +
-         std::to_string(desc.size.height) + "x" + std::to_string(desc.size.depth) + " mips " + std::to_string(desc.mips));
+    line("create texture '" + t.label + "' " + std::string(name(desc.format)) + " " + std::to_string(desc.size.width) +
+         "x" + std::to_string(desc.size.height) + "x" + std::to_string(desc.size.depth) + " mips " +
+         std::to_string(desc.mips));
     const TextureHandle handle = textures_.insert(std::move(t));
     Texture& made = *textures_.get(handle);
     made.whole = views_.insert({made.label, {.texture = handle, .range = resolved(desc, {}), .as_array = true}, true});
@@ -75,11 +76,15 @@ Result<ViewHandle> NullDevice::create_view(const ViewDesc& desc) {
     return views_.insert(std::move(v));
 }
 
-Result<SamplerHandle> NullDevice::create_sampler(const SamplerDesc& desc) { return samplers_.insert({std::string(desc.label)}); }
+Result<SamplerHandle> NullDevice::create_sampler(const SamplerDesc& desc) {
+    return samplers_.insert({std::string(desc.label)});
+}
 
 Result<ShaderModule> NullDevice::create_shader_module(const ShaderModuleDesc& desc) {
     Result<Reflection> reflection = reflect_spirv(desc.spirv);
-    if (!reflection) return Error{"shader module '" + std::string(desc.label) + "': " + reflection.error().message, ErrorKind::Input};
+    if (!reflection)
+        return Error{"shader module '" + std::string(desc.label) + "': " + reflection.error().message,
+                     ErrorKind::Input};
     return shaders_.insert({std::string(desc.label), std::move(*reflection)});
 }
 
@@ -97,7 +102,8 @@ Result<PipelineLayout> NullDevice::create_pipeline_layout(const PipelineLayoutDe
     return layouts_.insert({std::string(desc.label), {desc.groups.begin(), desc.groups.end()}});
 }
 
-Result<Pipeline> NullDevice::make_pipeline(std::span<const ShaderModule> shaders, PipelineLayout layout, std::string_view label) {
+Result<Pipeline> NullDevice::make_pipeline(std::span<const ShaderModule> shaders, PipelineLayout layout,
+                                           std::string_view label) {
     Pipeline p{.label = std::string(label), .reflection = {}, .groups = {}};
     std::vector<const Reflection*> reflections;
     for (const ShaderModule shader : shaders) {

@@ -58,7 +58,8 @@ void ValidateEncoder::scope_end() {
     // Two bindings of one texture whose ranges overlap without being equal, both written: one use of each part is enough.
     for (size_t i = 0; i < scope_.size(); ++i) {
         const Use& u = scope_[i];
-        const bool covered = writes(u.access) && u.texture && std::any_of(scope_.begin(), scope_.begin() + ptrdiff_t(i), [&](const Use& o) {
+        const bool covered = writes(u.access) && u.texture &&
+                             std::any_of(scope_.begin(), scope_.begin() + ptrdiff_t(i), [&](const Use& o) {
                                  return o.texture == u.texture && overlap(o.range, u.range);
                              });
         if (!covered) note(u);
@@ -68,7 +69,10 @@ void ValidateEncoder::scope_end() {
 
 Use ValidateEncoder::part(const TexturePlace& place, const TextureInfo& t, Extent size, Access a) const {
     const bool volume = t.desc.dimension == Dimension::D3;
-    return {.buffer = {}, .texture = place.texture, .range = {place.mip, 1, volume ? 0 : place.origin.z, volume ? 1 : size.depth}, .access = a};
+    return {.buffer = {},
+            .texture = place.texture,
+            .range = {place.mip, 1, volume ? 0 : place.origin.z, volume ? 1 : size.depth},
+            .access = a};
 }
 
 // ---- passes
@@ -100,17 +104,21 @@ RenderPass& ValidateEncoder::begin_render(const RenderPassDesc& desc) {
             fault(formatted("an attachment is one mip and one layer of texture '{}'", t->label));
         const Extent e = mip_extent(t->desc, v->desc.range.base_mip);
         if (size.width != 0 && (e.width != size.width || e.height != size.height))
-            fault(formatted("attachment '{}' is {}x{}, another is {}x{}", t->label, e.width, e.height, size.width, size.height));
+            fault(formatted("attachment '{}' is {}x{}, another is {}x{}", t->label, e.width, e.height, size.width,
+                            size.height));
         size = e;
-        if (error_.empty()) scope_add({.buffer = {}, .texture = v->desc.texture, .range = v->desc.range, .access = access});
+        if (error_.empty())
+            scope_add({.buffer = {}, .texture = v->desc.texture, .range = v->desc.range, .access = access});
         return t->desc.format;
     };
     if (ok) {
         if (desc.colors.empty() && !desc.depth.view) fault("no attachment");
         if (desc.colors.size() > kMaxColorTargets) fault("too many colour attachments");
-        for (const ColorAttachment& c : desc.colors) color_formats_.push_back(attach(c.view, TextureUsage::Color, Access::ColorWrite));
+        for (const ColorAttachment& c : desc.colors)
+            color_formats_.push_back(attach(c.view, TextureUsage::Color, Access::ColorWrite));
         if (desc.depth.view)
-            depth_format_ = attach(desc.depth.view, TextureUsage::Depth, desc.depth.read_only ? Access::DepthRead : Access::DepthWrite);
+            depth_format_ = attach(desc.depth.view, TextureUsage::Depth,
+                                   desc.depth.read_only ? Access::DepthRead : Access::DepthWrite);
         ok = error_.empty();
     }
     if (ok) render_below_ = &below_->begin_render(desc);
@@ -174,13 +182,16 @@ void ValidateEncoder::set_bind_group(uint32_t index, BindGroup group, std::span<
         if (dynamic < dynamic_offsets.size()) {
             const uint32_t offset = dynamic_offsets[dynamic];
             const BufferInfo* b = objects_.buffers.find(r.buffer);
-            if (offset % kBindingAlignment != 0) fault(formatted("dynamic offset {} is not a multiple of {}", offset, kBindingAlignment));
-            if (b && r.offset + offset + r.size > b->desc.size) fault(formatted("dynamic offset {} goes past the end of buffer '{}'", offset, b->label));
+            if (offset % kBindingAlignment != 0)
+                fault(formatted("dynamic offset {} is not a multiple of {}", offset, kBindingAlignment));
+            if (b && r.offset + offset + r.size > b->desc.size)
+                fault(formatted("dynamic offset {} goes past the end of buffer '{}'", offset, b->label));
         }
         ++dynamic;
     }
     if (dynamic != dynamic_offsets.size())
-        fault(formatted("bind group '{}' takes {} dynamic offsets, {} are given", g->label, dynamic, dynamic_offsets.size()));
+        fault(formatted("bind group '{}' takes {} dynamic offsets, {} are given", g->label, dynamic,
+                        dynamic_offsets.size()));
     if (!error_.empty()) return;
     groups_[index] = {group, {dynamic_offsets.begin(), dynamic_offsets.end()}};
     if (in_ == In::Render) {
@@ -206,10 +217,12 @@ void ValidateEncoder::set_push(std::span<const std::byte> bytes) {
 
 bool ValidateEncoder::bind_all(const PipelineInfo& p, bool compute) {
     if (push_bytes_ < p.push_bytes)
-        return fault(formatted("pipeline '{}' reads {} B of push data, {} are set", p.label, p.push_bytes, push_bytes_));
+        return fault(
+            formatted("pipeline '{}' reads {} B of push data, {} are set", p.label, p.push_bytes, push_bytes_));
     for (uint32_t set = 0; set < p.groups.size(); ++set) {
         if (p.groups[set].empty()) continue;
-        if (!groups_[set].group) return fault(formatted("pipeline '{}' needs bind group {}, none is set", p.label, set));
+        if (!groups_[set].group)
+            return fault(formatted("pipeline '{}' needs bind group {}, none is set", p.label, set));
         const GroupInfo* g = find(objects_.groups, groups_[set].group);
         if (!g) return false;
         if (g->entries != p.groups[set])
@@ -220,12 +233,14 @@ bool ValidateEncoder::bind_all(const PipelineInfo& p, bool compute) {
                 if (!b) return false;
                 for (const PipelineInfo::Block& block : p.blocks)
                     if (block.set == set && block.binding == r.slot.binding && r.size < block.bytes)
-                        return fault(formatted("binding '{}' of pipeline '{}' is {} B, bind group '{}' gives {}", block.name, p.label,
-                                               block.bytes, g->label, r.size));
+                        return fault(formatted("binding '{}' of pipeline '{}' is {} B, bind group '{}' gives {}",
+                                               block.name, p.label, block.bytes, g->label, r.size));
                 if (!scope_add(whole(r.buffer, access_of(r.slot, compute)))) return false;
             } else if (r.texture) {
                 if (!find(objects_.views, r.view) || !find(objects_.textures, r.texture)) return false;
-                if (!scope_add({.buffer = {}, .texture = r.texture, .range = r.range, .access = access_of(r.slot, compute)})) return false;
+                if (!scope_add(
+                        {.buffer = {}, .texture = r.texture, .range = r.range, .access = access_of(r.slot, compute)}))
+                    return false;
             } else if (!find(objects_.samplers, r.sampler)) {
                 return false;
             }
@@ -257,7 +272,8 @@ bool ValidateEncoder::indirect(BufferHandle buffer, uint64_t offset, uint64_t by
     if (!good(check_access(Access::IndirectRead, *b))) return false;
     if (offset % 4 != 0) return fault(formatted("offset {} is not a multiple of 4", offset));
     if (offset > b->desc.size || bytes > b->desc.size - offset)
-        return fault(formatted("{} B at {} go past the end of buffer '{}' ({} B)", bytes, offset, b->label, b->desc.size));
+        return fault(
+            formatted("{} B at {} go past the end of buffer '{}' ({} B)", bytes, offset, b->label, b->desc.size));
     return scope_add(whole(buffer, Access::IndirectRead));
 }
 
@@ -320,13 +336,15 @@ bool ValidateEncoder::ready_to_draw(bool indexed) {
     const RenderInfo* p = find(objects_.render, render_);
     if (!p) return false;
     for (uint32_t slot = 0; slot < p->vertex_buffers; ++slot)
-        if (slot >= vertex_buffers_.size() || !vertex_buffers_[slot]) return fault(formatted("vertex buffer {} is not set", slot));
+        if (slot >= vertex_buffers_.size() || !vertex_buffers_[slot])
+            return fault(formatted("vertex buffer {} is not set", slot));
     if (indexed && !index_buffer_) return fault("no index buffer is set");
     return bind_all(*p, false);
 }
 
 void ValidateEncoder::draw(uint32_t vertices, uint32_t instances, uint32_t first_vertex, uint32_t first_instance) {
-    if (step("draw", In::Render) && ready_to_draw(false)) render_below_->draw(vertices, instances, first_vertex, first_instance);
+    if (step("draw", In::Render) && ready_to_draw(false))
+        render_below_->draw(vertices, instances, first_vertex, first_instance);
 }
 
 void ValidateEncoder::draw_indexed(uint32_t indices, uint32_t instances, uint32_t first_index, int32_t base_vertex,
@@ -338,7 +356,8 @@ void ValidateEncoder::draw_indexed(uint32_t indices, uint32_t instances, uint32_
 void ValidateEncoder::draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) {
     if (!step("draw_indirect", In::Render) || !ready_to_draw(false)) return;
     if (draws > 1 && !device_.caps().multi_draw_indirect) return void(fault("the device draws one at a time"));
-    if (indirect(buffer, offset, draws == 0 ? 0 : uint64_t{stride} * (draws - 1) + 16)) render_below_->draw_indirect(buffer, offset, draws, stride);
+    if (indirect(buffer, offset, draws == 0 ? 0 : uint64_t{stride} * (draws - 1) + 16))
+        render_below_->draw_indirect(buffer, offset, draws, stride);
 }
 
 void ValidateEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) {
@@ -350,17 +369,21 @@ void ValidateEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset
 
 // ---- copies
 
-void ValidateEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) {
+void ValidateEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                                  uint64_t size) {
     if (!step("copy_buffer", In::Nothing)) return;
     const BufferInfo* from = find(objects_.buffers, src);
     const BufferInfo* to = find(objects_.buffers, dst);
     if (!from || !to || !good(check_access(Access::CopyRead, *from))) return;
-    if (!any(to->desc.usage & BufferUsage::CopyDst)) return void(fault(formatted("buffer '{}' lacks usage CopyDst", to->label)));
+    if (!any(to->desc.usage & BufferUsage::CopyDst))
+        return void(fault(formatted("buffer '{}' lacks usage CopyDst", to->label)));
     if (src == dst) return void(fault(formatted("buffer '{}' is copied to itself", from->label)));
-    if (src_offset % 4 != 0 || dst_offset % 4 != 0 || size % 4 != 0) return void(fault("offsets and size must be multiples of 4"));
+    if (src_offset % 4 != 0 || dst_offset % 4 != 0 || size % 4 != 0)
+        return void(fault("offsets and size must be multiples of 4"));
     for (const auto& [b, offset] : {std::pair(from, src_offset), std::pair(to, dst_offset)})
         if (offset > b->desc.size || size > b->desc.size - offset)
-            return void(fault(formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, offset, b->label, b->desc.size)));
+            return void(fault(
+                formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, offset, b->label, b->desc.size)));
     note(whole(src, Access::CopyRead));
     note(whole(dst, Access::CopyWrite));
     below_->copy_buffer(src, src_offset, dst, dst_offset, size);
@@ -383,8 +406,10 @@ void ValidateEncoder::copy_texture_to_buffer(const TexturePlace& src, const Buff
     const TextureInfo* from = find(objects_.textures, src.texture);
     const BufferInfo* to = find(objects_.buffers, dst.buffer);
     if (!from || !to || !good(check_access(Access::CopyRead, *from))) return;
-    if (!any(to->desc.usage & BufferUsage::CopyDst)) return void(fault(formatted("buffer '{}' lacks usage CopyDst", to->label)));
-    if (!good(check_region(*from, src, size)) || !good(check_rows(*from, dst, size, to->desc.size, device_.limits()))) return;
+    if (!any(to->desc.usage & BufferUsage::CopyDst))
+        return void(fault(formatted("buffer '{}' lacks usage CopyDst", to->label)));
+    if (!good(check_region(*from, src, size)) || !good(check_rows(*from, dst, size, to->desc.size, device_.limits())))
+        return;
     note(part(src, *from, size, Access::CopyRead));
     note(whole(dst.buffer, Access::CopyWrite));
     below_->copy_texture_to_buffer(src, dst, size);
@@ -398,7 +423,8 @@ void ValidateEncoder::copy_texture(const TexturePlace& src, const TexturePlace& 
         !good(check_region(*from, src, size)) || !good(check_region(*to, dst, size)))
         return;
     if (from->desc.format != to->desc.format)
-        return void(fault(formatted("'{}' is {}, '{}' is {}", from->label, name(from->desc.format), to->label, name(to->desc.format))));
+        return void(fault(formatted("'{}' is {}, '{}' is {}", from->label, name(from->desc.format), to->label,
+                                    name(to->desc.format))));
     const Use read = part(src, *from, size, Access::CopyRead);
     const Use write = part(dst, *to, size, Access::CopyWrite);
     if (src.texture == dst.texture && overlap(read.range, write.range))
@@ -412,10 +438,13 @@ void ValidateEncoder::clear_buffer(BufferHandle buffer, uint64_t offset, uint64_
     if (!step("clear_buffer", In::Nothing)) return;
     const BufferInfo* b = find(objects_.buffers, buffer);
     if (!b) return;
-    if (!any(b->desc.usage & BufferUsage::CopyDst)) return void(fault(formatted("buffer '{}' lacks usage CopyDst", b->label)));
-    if (offset % 4 != 0 || (size != kWholeSize && size % 4 != 0)) return void(fault("offset and size must be multiples of 4"));
+    if (!any(b->desc.usage & BufferUsage::CopyDst))
+        return void(fault(formatted("buffer '{}' lacks usage CopyDst", b->label)));
+    if (offset % 4 != 0 || (size != kWholeSize && size % 4 != 0))
+        return void(fault("offset and size must be multiples of 4"));
     if (offset > b->desc.size || (size != kWholeSize && size > b->desc.size - offset))
-        return void(fault(formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, offset, b->label, b->desc.size)));
+        return void(
+            fault(formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, offset, b->label, b->desc.size)));
     note(whole(buffer, Access::CopyWrite));
     below_->clear_buffer(buffer, offset, size, word);
 }
@@ -425,7 +454,8 @@ void ValidateEncoder::clear_texture(TextureHandle texture, std::array<float, 4> 
     const TextureInfo* t = find(objects_.textures, texture);
     if (!t || !good(check_access(Access::CopyWrite, *t))) return;
     const Subresources r = resolved(t->desc, range);
-    if (r.mip_count == 0 || r.layer_count == 0 || r.base_mip + r.mip_count > t->desc.mips || r.base_layer + r.layer_count > layer_count(t->desc))
+    if (r.mip_count == 0 || r.layer_count == 0 || r.base_mip + r.mip_count > t->desc.mips ||
+        r.base_layer + r.layer_count > layer_count(t->desc))
         return void(fault(formatted("the range is beyond texture '{}'", t->label)));
     note({.buffer = {}, .texture = texture, .range = r, .access = Access::CopyWrite});
     below_->clear_texture(texture, value, range);
@@ -458,7 +488,8 @@ void ValidateEncoder::write_timestamp(QuerySet set, uint32_t index) {
     if (!step("write_timestamp", In::Nothing)) return;
     QueryInfo* q = find(objects_.queries, set);
     if (!q) return;
-    if (index >= q->written.size()) return void(fault(formatted("query {} of '{}', which has {}", index, q->label, q->written.size())));
+    if (index >= q->written.size())
+        return void(fault(formatted("query {} of '{}', which has {}", index, q->label, q->written.size())));
     q->written[index] = true;
     below_->write_timestamp(set, index);
 }
@@ -468,12 +499,15 @@ void ValidateEncoder::resolve_queries(QuerySet set, uint32_t first, uint32_t cou
     const QueryInfo* q = find(objects_.queries, set);
     const BufferInfo* b = find(objects_.buffers, dst);
     if (!q || !b) return;
-    if (!any(b->desc.usage & BufferUsage::QueryResolve)) return void(fault(formatted("buffer '{}' lacks usage QueryResolve", b->label)));
-    if (uint64_t{first} + count > q->written.size()) return void(fault(formatted("'{}' has {} queries", q->label, q->written.size())));
+    if (!any(b->desc.usage & BufferUsage::QueryResolve))
+        return void(fault(formatted("buffer '{}' lacks usage QueryResolve", b->label)));
+    if (uint64_t{first} + count > q->written.size())
+        return void(fault(formatted("'{}' has {} queries", q->label, q->written.size())));
     for (uint32_t i = first; i < first + count; ++i)
         if (!q->written[i]) return void(fault(formatted("query {} of '{}' was never written", i, q->label)));
     if (offset % 8 != 0 || offset > b->desc.size || count * 8ull > b->desc.size - offset)
-        return void(fault(formatted("{} B at {}: not a multiple of 8, or past the end of buffer '{}' ({} B)", count * 8ull, offset, b->label, b->desc.size)));
+        return void(fault(formatted("{} B at {}: not a multiple of 8, or past the end of buffer '{}' ({} B)",
+                                    count * 8ull, offset, b->label, b->desc.size)));
     note(whole(dst, Access::CopyWrite));
     below_->resolve_queries(set, first, count, dst, offset);
 }

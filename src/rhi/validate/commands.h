@@ -13,7 +13,8 @@ public:
 
     ComputePass& begin_compute(std::string_view label) override;
     RenderPass& begin_render(const RenderPassDesc& desc) override;
-    void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) override;
+    void copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                     uint64_t size) override;
     void copy_buffer_to_texture(const BufferLayout& src, const TexturePlace& dst, Extent size) override;
     void copy_texture_to_buffer(const TexturePlace& src, const BufferLayout& dst, Extent size) override;
     void copy_texture(const TexturePlace& src, const TexturePlace& dst, Extent size) override;
@@ -64,8 +65,8 @@ private:
         if (!out) fault(table.why_not(handle));
         return out;
     }
-    void note(const Use& use);           // a use by this step alone
-    bool scope_add(const Use& use);      // a use by the running dispatch or render pass
+    void note(const Use& use);       // a use by this step alone
+    bool scope_add(const Use& use);  // a use by the running dispatch or render pass
     void scope_end();
     bool bind_all(const PipelineInfo& pipeline, bool compute);
     bool indirect(BufferHandle buffer, uint64_t offset, uint64_t bytes);

@@ -38,9 +38,11 @@ const Reflection* ValidateDevice::reflection(ComputePipeline pipeline) {
     return nullptr;
 }
 
-BindGroupLayout ValidateDevice::remember_group_layout(BindGroupLayout handle, const PipelineInfo& pipeline, uint32_t index) {
+BindGroupLayout ValidateDevice::remember_group_layout(BindGroupLayout handle, const PipelineInfo& pipeline,
+                                                      uint32_t index) {
     if (handle && !objects_.group_layouts.find(handle))
-        objects_.group_layouts.set(handle, {formatted("group {} of '{}'", index, pipeline.label), pipeline.groups[index], true});
+        objects_.group_layouts.set(
+            handle, {formatted("group {} of '{}'", index, pipeline.label), pipeline.groups[index], true});
     return handle;
 }
 
@@ -85,12 +87,16 @@ ViewDesc ValidateDevice::desc(ViewHandle view) {
 Result<void> ValidateDevice::write_buffer(BufferHandle buffer, uint64_t offset, std::span<const std::byte> bytes) {
     const BufferInfo* b = objects_.buffers.find(buffer);
     if (!b) return refuse("write_buffer: " + objects_.buffers.why_not(buffer));
-    if (!any(b->desc.usage & BufferUsage::CopyDst)) return refuse(formatted("write_buffer: '{}' lacks usage CopyDst", b->label));
-    if (b->desc.memory != MemoryKind::Device) return refuse(formatted("write_buffer: '{}' is not device memory; map it", b->label));
+    if (!any(b->desc.usage & BufferUsage::CopyDst))
+        return refuse(formatted("write_buffer: '{}' lacks usage CopyDst", b->label));
+    if (b->desc.memory != MemoryKind::Device)
+        return refuse(formatted("write_buffer: '{}' is not device memory; map it", b->label));
     if (offset % 4 != 0 || bytes.size() % 4 != 0)
-        return refuse(formatted("write_buffer: {} B at {} of '{}': both must be multiples of 4", bytes.size(), offset, b->label));
+        return refuse(
+            formatted("write_buffer: {} B at {} of '{}': both must be multiples of 4", bytes.size(), offset, b->label));
     if (offset > b->desc.size || bytes.size() > b->desc.size - offset)
-        return refuse(formatted("write_buffer: {} B at {} go past the end of '{}' ({} B)", bytes.size(), offset, b->label, b->desc.size));
+        return refuse(formatted("write_buffer: {} B at {} go past the end of '{}' ({} B)", bytes.size(), offset,
+                                b->label, b->desc.size));
     Result<void> done = below_->write_buffer(buffer, offset, bytes);
     if (done && !bytes.empty()) written_buffers_.push_back(buffer);
     return done;
@@ -99,12 +105,14 @@ Result<void> ValidateDevice::write_buffer(BufferHandle buffer, uint64_t offset, 
 Result<void> ValidateDevice::write_texture(const TextureWrite& write, std::span<const std::byte> bytes) {
     const TextureInfo* t = objects_.textures.find(write.place.texture);
     if (!t) return refuse("write_texture: " + objects_.textures.why_not(write.place.texture));
-    if (!any(t->desc.usage & TextureUsage::CopyDst)) return refuse(formatted("write_texture: '{}' lacks usage CopyDst", t->label));
+    if (!any(t->desc.usage & TextureUsage::CopyDst))
+        return refuse(formatted("write_texture: '{}' lacks usage CopyDst", t->label));
     std::string fault = check_region(*t, write.place, write.size);
     if (fault.empty()) {
         Limits any_row = limits();  // the bytes are the CPU's: rows may lie as they like
         any_row.copy_row_alignment = any_row.copy_offset_alignment = 1;
-        fault = check_rows(*t, {.bytes_per_row = write.bytes_per_row, .rows_per_layer = write.rows_per_layer}, write.size, bytes.size(), any_row);
+        fault = check_rows(*t, {.bytes_per_row = write.bytes_per_row, .rows_per_layer = write.rows_per_layer},
+                           write.size, bytes.size(), any_row);
     }
     if (fault.empty() && !any(write.after)) fault = "`after` is Undefined";
     if (fault.empty()) fault = check_access(write.after, *t);
@@ -152,7 +160,8 @@ Result<std::span<std::byte>> ValidateDevice::map(BufferHandle buffer) {
     if (b->desc.memory == MemoryKind::Device) return refuse(formatted("map: '{}' is in device memory", b->label));
     if (b->mapped) return refuse(formatted("map: '{}' is mapped already", b->label));
     if (!below_->completed(b->last_use))
-        return refuse(formatted("map: '{}' is used by submit {}, which is not done; wait for it", b->label, b->last_use));
+        return refuse(
+            formatted("map: '{}' is used by submit {}, which is not done; wait for it", b->label, b->last_use));
     if (b->desc.memory == MemoryKind::Readback && b->last_use > 0 && !tracker_.ready_for_host(buffer))
         return refuse(formatted("map: '{}' was written by the GPU without a barrier to HostRead", b->label));
     Result<std::span<std::byte>> bytes = below_->map(buffer);

@@ -13,7 +13,8 @@ namespace kiln::rhi::validate {
 namespace {
 
 bool is_buffer(BindingKind kind) {
-    return kind == BindingKind::UniformBuffer || kind == BindingKind::StorageBuffer || kind == BindingKind::StorageBufferReadOnly;
+    return kind == BindingKind::UniformBuffer || kind == BindingKind::StorageBuffer ||
+           kind == BindingKind::StorageBufferReadOnly;
 }
 
 bool is_storage_texture(BindingKind kind) {
@@ -25,9 +26,11 @@ std::string check(const BufferDesc& d, const Caps& caps) {
     if (d.usage == BufferUsage::None) return "no usage";
     if (d.memory == MemoryKind::Readback && any(d.usage & ~(BufferUsage::CopyDst | BufferUsage::QueryResolve)))
         return "readback memory is for CopyDst and QueryResolve only";
-    if (d.memory == MemoryKind::Upload && any(d.usage & ~BufferUsage::CopySrc)) return "upload memory is for CopySrc only";
+    if (d.memory == MemoryKind::Upload && any(d.usage & ~BufferUsage::CopySrc))
+        return "upload memory is for CopySrc only";
     if (d.memory != MemoryKind::Device && d.heap) return "a heap holds device memory only";
-    if (any(d.usage & BufferUsage::Address) && !caps.buffer_address) return "usage Address needs the capability buffer_address";
+    if (any(d.usage & BufferUsage::Address) && !caps.buffer_address)
+        return "usage Address needs the capability buffer_address";
     return {};
 }
 
@@ -38,15 +41,21 @@ std::string check(const TextureDesc& d, const Caps& caps) {
     const FormatInfo& f = info(d.format);
     const uint32_t most = d.dimension == Dimension::D3 ? kMaxTexture3d : kMaxTexture2d;
     if (std::max(d.size.width, d.size.height) > most || (d.dimension == Dimension::D3 && d.size.depth > most))
-        return formatted("{}x{}x{} is beyond the floor of {} along an edge", d.size.width, d.size.height, d.size.depth, most);
+        return formatted("{}x{}x{} is beyond the floor of {} along an edge", d.size.width, d.size.height, d.size.depth,
+                         most);
     if (d.dimension == Dimension::D2Array && d.size.depth > kMaxTextureLayers)
         return formatted("{} layers, the floor is {}", d.size.depth, kMaxTextureLayers);
-    if (d.dimension == Dimension::D1 && (d.size.height != 1 || d.mips != 1)) return "a D1 texture has height 1 and one mip";
-    if ((d.dimension == Dimension::D1 || d.dimension == Dimension::D2) && d.size.depth != 1) return "depth is not 1; use D2Array or D3";
-    if (d.mips == 0 || d.mips > full_mip_count(d)) return formatted("{} mips, there can be {}", d.mips, full_mip_count(d));
-    if (any(d.usage & TextureUsage::Storage) && !f.core_storage && !(caps.storage_r16f && f.sample_type != SampleType::Depth))
+    if (d.dimension == Dimension::D1 && (d.size.height != 1 || d.mips != 1))
+        return "a D1 texture has height 1 and one mip";
+    if ((d.dimension == Dimension::D1 || d.dimension == Dimension::D2) && d.size.depth != 1)
+        return "depth is not 1; use D2Array or D3";
+    if (d.mips == 0 || d.mips > full_mip_count(d))
+        return formatted("{} mips, there can be {}", d.mips, full_mip_count(d));
+    if (any(d.usage & TextureUsage::Storage) && !f.core_storage &&
+        !(caps.storage_r16f && f.sample_type != SampleType::Depth))
         return formatted("{} can't be a storage texture here", f.name);
-    if (any(d.usage & TextureUsage::Depth) != (f.sample_type == SampleType::Depth) && any(d.usage & (TextureUsage::Depth | TextureUsage::Color)))
+    if (any(d.usage & TextureUsage::Depth) != (f.sample_type == SampleType::Depth) &&
+        any(d.usage & (TextureUsage::Depth | TextureUsage::Color)))
         return formatted("{} as a {} attachment", f.name, any(d.usage & TextureUsage::Depth) ? "depth" : "colour");
     return {};
 }
@@ -57,7 +66,8 @@ std::string ValidateDevice::check_placement(HeapHandle heap, uint64_t offset, co
     if (!heap) return {};
     const HeapInfo* h = objects_.heaps.find(heap);
     if (!h) return objects_.heaps.why_not(heap);
-    if (offset % need.alignment != 0) return formatted("heap offset {} is not a multiple of {}", offset, need.alignment);
+    if (offset % need.alignment != 0)
+        return formatted("heap offset {} is not a multiple of {}", offset, need.alignment);
     if (offset > h->size || need.size > h->size - offset)
         return formatted("{} B at {} go past the end of heap '{}' ({} B)", need.size, offset, h->label, h->size);
     return {};
@@ -100,7 +110,8 @@ Result<TextureHandle> ValidateDevice::create_texture(const TextureDesc& desc) {
     TextureInfo made{.label = std::string(desc.label), .desc = desc, .need = need, .whole = below_->whole_view(*out)};
     made.desc.label = {};
     if (made.whole)
-        objects_.views.set(made.whole, {made.label, {.texture = *out, .range = resolved(desc, {}), .as_array = true}, true});
+        objects_.views.set(made.whole,
+                           {made.label, {.texture = *out, .range = resolved(desc, {}), .as_array = true}, true});
     objects_.textures.set(*out, std::move(made));
     tracker_.add(*out);
     return out;
@@ -112,16 +123,19 @@ Result<ViewHandle> ValidateDevice::create_view(const ViewDesc& desc) {
     const Subresources r = resolved(t->desc, desc.range);
     if (r.mip_count == 0 || r.layer_count == 0 || r.base_mip + r.mip_count > t->desc.mips ||
         r.base_layer + r.layer_count > layer_count(t->desc))
-        return refuse(formatted("view '{}': mips {}+{}, layers {}+{} are beyond texture '{}' ({} mips, {} layers)", desc.label, r.base_mip,
-                                r.mip_count, r.base_layer, r.layer_count, t->label, t->desc.mips, layer_count(t->desc)));
+        return refuse(formatted("view '{}': mips {}+{}, layers {}+{} are beyond texture '{}' ({} mips, {} layers)",
+                                desc.label, r.base_mip, r.mip_count, r.base_layer, r.layer_count, t->label,
+                                t->desc.mips, layer_count(t->desc)));
     Result<ViewHandle> out = below_->create_view(desc);
     if (!out) return out;
-    objects_.views.set(*out, {std::string(desc.label), {.texture = desc.texture, .range = r, .as_array = desc.as_array}, false});
+    objects_.views.set(
+        *out, {std::string(desc.label), {.texture = desc.texture, .range = r, .as_array = desc.as_array}, false});
     return out;
 }
 
 Result<SamplerHandle> ValidateDevice::create_sampler(const SamplerDesc& desc) {
-    if (!(desc.lod_min <= desc.lod_max)) return refuse(formatted("sampler '{}': lod_min {} > lod_max {}", desc.label, desc.lod_min, desc.lod_max));
+    if (!(desc.lod_min <= desc.lod_max))
+        return refuse(formatted("sampler '{}': lod_min {} > lod_max {}", desc.label, desc.lod_min, desc.lod_max));
     Result<SamplerHandle> out = below_->create_sampler(desc);
     if (out) objects_.samplers.set(*out, {std::string(desc.label)});
     return out;
@@ -141,8 +155,10 @@ Result<BindGroupLayout> ValidateDevice::create_bind_group_layout(const BindGroup
         const BindGroupLayoutEntry& e = entries[i];
         if (i > 0 && entries[i - 1].binding == e.binding) fault = formatted("binding {} twice", e.binding);
         if (!any(e.stages)) fault = formatted("binding {} is for no stage", e.binding);
-        if (e.dynamic_offset && !is_buffer(e.kind)) fault = formatted("binding {}: only buffers have dynamic offsets", e.binding);
-        if (is_storage_texture(e.kind) && e.format == Format::Undefined) fault = formatted("binding {}: a storage texture has a format", e.binding);
+        if (e.dynamic_offset && !is_buffer(e.kind))
+            fault = formatted("binding {}: only buffers have dynamic offsets", e.binding);
+        if (is_storage_texture(e.kind) && e.format == Format::Undefined)
+            fault = formatted("binding {}: a storage texture has a format", e.binding);
     }
     if (!fault.empty()) return refuse(formatted("bind group layout '{}': {}", desc.label, fault));
     Result<BindGroupLayout> out = below_->create_bind_group_layout(desc);
@@ -150,7 +166,8 @@ Result<BindGroupLayout> ValidateDevice::create_bind_group_layout(const BindGroup
     return out;
 }
 
-std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const BindGroupEntry& entry, BoundResource& out) {
+std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const BindGroupEntry& entry,
+                                        BoundResource& out) {
     out.slot = slot;
     if (is_buffer(slot.kind)) {
         const BufferInfo* b = objects_.buffers.find(entry.buffer);
@@ -158,11 +175,15 @@ std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const 
         const bool uniform = slot.kind == BindingKind::UniformBuffer;
         if (!any(b->desc.usage & (uniform ? BufferUsage::Uniform : BufferUsage::Storage)))
             return formatted("buffer '{}' lacks usage {}", b->label, uniform ? "Uniform" : "Storage");
-        if (entry.offset % kBindingAlignment != 0) return formatted("offset {} of buffer '{}' is not a multiple of {}", entry.offset, b->label, kBindingAlignment);
-        if (entry.offset >= b->desc.size) return formatted("offset {} is past the end of buffer '{}' ({} B)", entry.offset, b->label, b->desc.size);
+        if (entry.offset % kBindingAlignment != 0)
+            return formatted("offset {} of buffer '{}' is not a multiple of {}", entry.offset, b->label,
+                             kBindingAlignment);
+        if (entry.offset >= b->desc.size)
+            return formatted("offset {} is past the end of buffer '{}' ({} B)", entry.offset, b->label, b->desc.size);
         const uint64_t size = entry.size == kWholeSize ? b->desc.size - entry.offset : entry.size;
         if (size == 0 || size > b->desc.size - entry.offset)
-            return formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, entry.offset, b->label, b->desc.size);
+            return formatted("{} B at {} go past the end of buffer '{}' ({} B)", size, entry.offset, b->label,
+                             b->desc.size);
         const uint64_t most = uniform ? kMaxUniformBinding : kMaxStorageBinding;
         if (size > most) return formatted("{} B of buffer '{}' in one binding, the floor is {}", size, b->label, most);
         out.buffer = entry.buffer;
@@ -182,13 +203,16 @@ std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const 
     const bool storage = is_storage_texture(slot.kind);
     if (!any(t->desc.usage & (storage ? TextureUsage::Storage : TextureUsage::Sampled)))
         return formatted("texture '{}' lacks usage {}", t->label, storage ? "Storage" : "Sampled");
-    const Dimension seen = t->desc.dimension == Dimension::D2Array && v->desc.range.layer_count == 1 && !v->desc.as_array
-                               ? Dimension::D2
-                               : t->desc.dimension;
-    if (seen != slot.dimension) return formatted("the view of texture '{}' has another dimension than the shader's", t->label);
+    const Dimension seen =
+        t->desc.dimension == Dimension::D2Array && v->desc.range.layer_count == 1 && !v->desc.as_array
+            ? Dimension::D2
+            : t->desc.dimension;
+    if (seen != slot.dimension)
+        return formatted("the view of texture '{}' has another dimension than the shader's", t->label);
     if (storage && t->desc.format != slot.format)
         return formatted("texture '{}' is {}, the shader stores {}", t->label, name(t->desc.format), name(slot.format));
-    if (storage && v->desc.range.mip_count != 1) return formatted("a storage binding of texture '{}' must be of one mip", t->label);
+    if (storage && v->desc.range.mip_count != 1)
+        return formatted("a storage binding of texture '{}' must be of one mip", t->label);
     const SampleType type = rhi::info(t->desc.format).sample_type;
     if (!storage && (type == SampleType::Uint) != (slot.sample_type == SampleType::Uint))
         return formatted("texture '{}' is {}, the shader reads another kind of number", t->label, name(t->desc.format));
@@ -200,11 +224,13 @@ std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const 
 
 Result<BindGroup> ValidateDevice::create_bind_group(const BindGroupDesc& desc) {
     const GroupLayoutInfo* layout = objects_.group_layouts.find(desc.layout);
-    if (!layout) return refuse(formatted("bind group '{}': {}", desc.label, objects_.group_layouts.why_not(desc.layout)));
+    if (!layout)
+        return refuse(formatted("bind group '{}': {}", desc.label, objects_.group_layouts.why_not(desc.layout)));
     GroupInfo made{.label = std::string(desc.label), .entries = layout->entries, .resources = {}};
     std::string fault;
     for (const BindGroupLayoutEntry& slot : layout->entries) {
-        const auto given = std::find_if(desc.entries.begin(), desc.entries.end(), [&](const auto& e) { return e.binding == slot.binding; });
+        const auto given = std::find_if(desc.entries.begin(), desc.entries.end(),
+                                        [&](const auto& e) { return e.binding == slot.binding; });
         if (given == desc.entries.end()) {
             fault = formatted("binding {} ({}) is missing", slot.binding, name(slot.kind));
         } else {
@@ -240,7 +266,8 @@ Result<PipelineLayout> ValidateDevice::create_pipeline_layout(const PipelineLayo
     return out;
 }
 
-std::string ValidateDevice::fill_pipeline(PipelineInfo& out, std::span<const Reflection* const> shaders, PipelineLayout layout) {
+std::string ValidateDevice::fill_pipeline(PipelineInfo& out, std::span<const Reflection* const> shaders,
+                                          PipelineLayout layout) {
     uint32_t sets = 0;
     for (const Reflection* r : shaders) {
         if (const std::vector<std::string> beyond = check_floor(*r, caps()); !beyond.empty()) return beyond.front();
@@ -262,16 +289,21 @@ std::string ValidateDevice::fill_pipeline(PipelineInfo& out, std::span<const Ref
     }
     const LayoutInfo* l = objects_.layouts.find(layout);
     if (!l) return objects_.layouts.why_not(layout);
-    if (l->push_bytes < out.push_bytes) return formatted("layout '{}' has {} B of push data, the shader reads {}", l->label, l->push_bytes, out.push_bytes);
+    if (l->push_bytes < out.push_bytes)
+        return formatted("layout '{}' has {} B of push data, the shader reads {}", l->label, l->push_bytes,
+                         out.push_bytes);
     for (uint32_t set = 0; set < sets; ++set)
         for (const BindGroupLayoutEntry& e : wanted[set]) {
             const auto* given = set < l->groups.size() ? &l->groups[set] : nullptr;
-            const bool has = given && std::any_of(given->begin(), given->end(), [&](const BindGroupLayoutEntry& g) {
-                                 return g.binding == e.binding && g.kind == e.kind && g.format == e.format &&
-                                        (is_buffer(g.kind) || g.kind == BindingKind::Sampler || g.dimension == e.dimension) &&
-                                        !any(e.stages & ~g.stages);
-                             });
-            if (!has) return formatted("layout '{}' has no fitting entry for set {} binding {} ({})", l->label, set, e.binding, name(e.kind));
+            const bool has =
+                given && std::any_of(given->begin(), given->end(), [&](const BindGroupLayoutEntry& g) {
+                    return g.binding == e.binding && g.kind == e.kind && g.format == e.format &&
+                           (is_buffer(g.kind) || g.kind == BindingKind::Sampler || g.dimension == e.dimension) &&
+                           !any(e.stages & ~g.stages);
+                });
+            if (!has)
+                return formatted("layout '{}' has no fitting entry for set {} binding {} ({})", l->label, set,
+                                 e.binding, name(e.kind));
         }
     out.groups = l->groups;
     return {};
@@ -298,7 +330,8 @@ Result<RenderPipeline> ValidateDevice::create_render_pipeline(const RenderPipeli
     std::string fault;
     if (!vertex) fault = objects_.shaders.why_not(desc.vertex);
     if (fault.empty() && desc.fragment && !fragment) fault = objects_.shaders.why_not(desc.fragment);
-    if (fault.empty() && vertex->reflection.stage != ShaderStage::Vertex) fault = formatted("'{}' is not a vertex shader", vertex->label);
+    if (fault.empty() && vertex->reflection.stage != ShaderStage::Vertex)
+        fault = formatted("'{}' is not a vertex shader", vertex->label);
     if (fault.empty() && fragment && fragment->reflection.stage != ShaderStage::Fragment)
         fault = formatted("'{}' is not a fragment shader", fragment->label);
     if (!fault.empty()) return refuse(formatted("pipeline '{}': {}", desc.label, fault));
@@ -310,13 +343,17 @@ Result<RenderPipeline> ValidateDevice::create_render_pipeline(const RenderPipeli
     fault = fill_pipeline(made, shaders, desc.layout);
     if (fault.empty() && desc.colors.size() > kMaxColorTargets)
         fault = formatted("{} colour targets, the floor is {}", desc.colors.size(), kMaxColorTargets);
-    if (fault.empty() && desc.colors.empty() && desc.depth.format == Format::Undefined) fault = "neither colour nor depth";
+    if (fault.empty() && desc.colors.empty() && desc.depth.format == Format::Undefined)
+        fault = "neither colour nor depth";
     for (const ColorTarget& c : desc.colors) {
-        if (c.format == Format::Undefined || is_depth(c.format)) fault = formatted("{} as a colour target", name(c.format));
-        if (c.blend && rhi::info(c.format).sample_type != SampleType::Float) fault = formatted("{} can't be blended", name(c.format));
+        if (c.format == Format::Undefined || is_depth(c.format))
+            fault = formatted("{} as a colour target", name(c.format));
+        if (c.blend && rhi::info(c.format).sample_type != SampleType::Float)
+            fault = formatted("{} can't be blended", name(c.format));
         made.colors.push_back(c.format);
     }
-    if (desc.depth.format != Format::Undefined && !is_depth(desc.depth.format)) fault = formatted("{} as depth", name(desc.depth.format));
+    if (desc.depth.format != Format::Undefined && !is_depth(desc.depth.format))
+        fault = formatted("{} as depth", name(desc.depth.format));
     for (const VertexBufferLayout& b : desc.vertex_buffers)
         for (const VertexAttribute& a : b.attributes)
             if (a.offset + bytes_per_vertex_attribute(a.format) > b.stride)
@@ -332,7 +369,8 @@ Result<RenderPipeline> ValidateDevice::create_render_pipeline(const RenderPipeli
 
 Result<QuerySet> ValidateDevice::create_query_set(const QuerySetDesc& desc) {
     if (!caps().timestamp) return refuse(formatted("query set '{}': the device has no timestamps", desc.label));
-    if (desc.count == 0 || desc.count > 4096) return refuse(formatted("query set '{}': {} queries, at least 1 and at most 4096", desc.label, desc.count));
+    if (desc.count == 0 || desc.count > 4096)
+        return refuse(formatted("query set '{}': {} queries, at least 1 and at most 4096", desc.label, desc.count));
     Result<QuerySet> out = below_->create_query_set(desc);
     if (out) objects_.queries.set(*out, {std::string(desc.label), std::vector<bool>(desc.count)});
     return out;
@@ -342,8 +380,10 @@ void ValidateDevice::destroy(HeapHandle handle) {
     const HeapInfo* h = objects_.heaps.find(handle);
     if (!h) return report_("destroy: " + objects_.heaps.why_not(handle));
     bool inhabited = false;
-    objects_.buffers.for_each([&](BufferHandle, const BufferInfo& b) { inhabited = inhabited || b.desc.heap == handle; });
-    objects_.textures.for_each([&](TextureHandle, const TextureInfo& t) { inhabited = inhabited || t.desc.heap == handle; });
+    objects_.buffers.for_each(
+        [&](BufferHandle, const BufferInfo& b) { inhabited = inhabited || b.desc.heap == handle; });
+    objects_.textures.for_each(
+        [&](TextureHandle, const TextureInfo& t) { inhabited = inhabited || t.desc.heap == handle; });
     if (inhabited) return report_(formatted("destroy: heap '{}' still holds resources", h->label));
     forget(objects_.heaps, handle);
 }

@@ -69,51 +69,73 @@ std::string check_region(const TextureInfo& t, const TexturePlace& p, Extent siz
     if (p.mip >= t.desc.mips) return formatted("texture '{}' has no mip {}", t.label, p.mip);
     const Extent e = mip_extent(t.desc, p.mip);
     const auto fits = [](uint32_t at, uint32_t length, uint32_t whole) { return at <= whole && length <= whole - at; };
-    if (!fits(p.origin.x, size.width, e.width) || !fits(p.origin.y, size.height, e.height) || !fits(p.origin.z, size.depth, e.depth))
-        return formatted("{}x{}x{} at {},{},{} goes past mip {} of texture '{}' ({}x{}x{})", size.width, size.height, size.depth,
-                         p.origin.x, p.origin.y, p.origin.z, p.mip, t.label, e.width, e.height, e.depth);
-    if (size.width == 0 || size.height == 0 || size.depth == 0) return formatted("texture '{}': an empty copy", t.label);
+    if (!fits(p.origin.x, size.width, e.width) || !fits(p.origin.y, size.height, e.height) ||
+        !fits(p.origin.z, size.depth, e.depth))
+        return formatted("{}x{}x{} at {},{},{} goes past mip {} of texture '{}' ({}x{}x{})", size.width, size.height,
+                         size.depth, p.origin.x, p.origin.y, p.origin.z, p.mip, t.label, e.width, e.height, e.depth);
+    if (size.width == 0 || size.height == 0 || size.depth == 0)
+        return formatted("texture '{}': an empty copy", t.label);
     return {};
 }
 
-std::string check_rows(const TextureInfo& t, const BufferLayout& l, Extent size, uint64_t buffer_bytes, const Limits& limits) {
+std::string check_rows(const TextureInfo& t, const BufferLayout& l, Extent size, uint64_t buffer_bytes,
+                       const Limits& limits) {
     const uint32_t texel = bytes_per_texel(t.desc.format);
     if (l.bytes_per_row != 0 && (l.bytes_per_row % texel != 0 || l.bytes_per_row < size.width * texel))
-        return formatted("bytes_per_row {}: not whole texels of {} B, or less than the {} texels of a row", l.bytes_per_row, texel, size.width);
+        return formatted("bytes_per_row {}: not whole texels of {} B, or less than the {} texels of a row",
+                         l.bytes_per_row, texel, size.width);
     if (l.bytes_per_row % limits.copy_row_alignment != 0)
         return formatted("bytes_per_row {} is not a multiple of {}", l.bytes_per_row, limits.copy_row_alignment);
     if (l.rows_per_layer != 0 && l.rows_per_layer < size.height)
         return formatted("rows_per_layer {} is less than the {} rows of the copy", l.rows_per_layer, size.height);
     if (l.offset % texel != 0 || l.offset % limits.copy_offset_alignment != 0)
-        return formatted("buffer offset {} is not a multiple of the texel's {} B and of {}", l.offset, texel, limits.copy_offset_alignment);
+        return formatted("buffer offset {} is not a multiple of the texel's {} B and of {}", l.offset, texel,
+                         limits.copy_offset_alignment);
     const RowLayout rows = row_layout(t.desc.format, size, l.bytes_per_row, l.rows_per_layer);
     if (l.offset > buffer_bytes || rows.total_bytes > buffer_bytes - l.offset)
-        return formatted("{} B at offset {} go past the end of the buffer ({} B)", rows.total_bytes, l.offset, buffer_bytes);
+        return formatted("{} B at offset {} go past the end of the buffer ({} B)", rows.total_bytes, l.offset,
+                         buffer_bytes);
     return {};
 }
 
 std::string check_counts(std::span<const std::vector<BindGroupLayoutEntry>> groups) {
-    if (groups.size() > kMaxBindGroups) return formatted("{} bind groups, the floor is {}", groups.size(), kMaxBindGroups);
+    if (groups.size() > kMaxBindGroups)
+        return formatted("{} bind groups, the floor is {}", groups.size(), kMaxBindGroups);
     for (const ShaderStage stage : {ShaderStage::Vertex, ShaderStage::Fragment, ShaderStage::Compute}) {
         uint32_t uniform = 0, storage = 0, sampled = 0, samplers = 0, images = 0;
         for (const auto& entries : groups)
             for (const BindGroupLayoutEntry& e : entries) {
                 if (!any(e.stages & stage)) continue;
                 switch (e.kind) {
-                    case BindingKind::UniformBuffer: ++uniform; break;
-                    case BindingKind::StorageBuffer:
-                    case BindingKind::StorageBufferReadOnly: ++storage; break;
-                    case BindingKind::SampledTexture: ++sampled; break;
-                    case BindingKind::Sampler: ++samplers; break;
-                    case BindingKind::StorageTexture:
-                    case BindingKind::StorageTextureReadOnly: ++images; break;
+                case BindingKind::UniformBuffer:
+                    ++uniform;
+                    break;
+                case BindingKind::StorageBuffer:
+                case BindingKind::StorageBufferReadOnly:
+                    ++storage;
+                    break;
+                case BindingKind::SampledTexture:
+                    ++sampled;
+                    break;
+                case BindingKind::Sampler:
+                    ++samplers;
+                    break;
+                case BindingKind::StorageTexture:
+                case BindingKind::StorageTextureReadOnly:
+                    ++images;
+                    break;
                 }
             }
-        if (uniform > kMaxUniformBuffersPerStage) return formatted("{} uniform buffers in a stage, the floor is {}", uniform, kMaxUniformBuffersPerStage);
-        if (storage > kMaxStorageBuffersPerStage) return formatted("{} storage buffers in a stage, the floor is {}", storage, kMaxStorageBuffersPerStage);
-        if (sampled > kMaxSampledTexturesPerStage) return formatted("{} sampled textures in a stage, the floor is {}", sampled, kMaxSampledTexturesPerStage);
-        if (samplers > kMaxSamplersPerStage) return formatted("{} samplers in a stage, the floor is {}", samplers, kMaxSamplersPerStage);
-        if (images > kMaxStorageTexturesPerStage) return formatted("{} storage textures in a stage, the floor is {}", images, kMaxStorageTexturesPerStage);
+        if (uniform > kMaxUniformBuffersPerStage)
+            return formatted("{} uniform buffers in a stage, the floor is {}", uniform, kMaxUniformBuffersPerStage);
+        if (storage > kMaxStorageBuffersPerStage)
+            return formatted("{} storage buffers in a stage, the floor is {}", storage, kMaxStorageBuffersPerStage);
+        if (sampled > kMaxSampledTexturesPerStage)
+            return formatted("{} sampled textures in a stage, the floor is {}", sampled, kMaxSampledTexturesPerStage);
+        if (samplers > kMaxSamplersPerStage)
+            return formatted("{} samplers in a stage, the floor is {}", samplers, kMaxSamplersPerStage);
+        if (images > kMaxStorageTexturesPerStage)
+            return formatted("{} storage textures in a stage, the floor is {}", images, kMaxStorageTexturesPerStage);
     }
     return {};
 }
@@ -125,13 +147,18 @@ bool overlap(const Subresources& a, const Subresources& b) {
 
 Access access_of(const BindGroupLayoutEntry& slot, bool compute) {
     switch (slot.kind) {
-        case BindingKind::UniformBuffer: return Access::UniformRead;
-        case BindingKind::StorageBuffer:
-        case BindingKind::StorageTexture: return compute ? Access::StorageWriteCompute : Access::StorageWriteGraphics;
-        case BindingKind::StorageBufferReadOnly:
-        case BindingKind::StorageTextureReadOnly: return compute ? Access::StorageReadCompute : Access::StorageReadGraphics;
-        case BindingKind::SampledTexture: return compute ? Access::SampledReadCompute : Access::SampledReadGraphics;
-        case BindingKind::Sampler: break;
+    case BindingKind::UniformBuffer:
+        return Access::UniformRead;
+    case BindingKind::StorageBuffer:
+    case BindingKind::StorageTexture:
+        return compute ? Access::StorageWriteCompute : Access::StorageWriteGraphics;
+    case BindingKind::StorageBufferReadOnly:
+    case BindingKind::StorageTextureReadOnly:
+        return compute ? Access::StorageReadCompute : Access::StorageReadGraphics;
+    case BindingKind::SampledTexture:
+        return compute ? Access::SampledReadCompute : Access::SampledReadGraphics;
+    case BindingKind::Sampler:
+        break;
     }
     return Access::Undefined;
 }

@@ -14,7 +14,8 @@ std::string check_access(Access access, const TextureInfo& texture);
 std::string check_region(const TextureInfo& texture, const TexturePlace& place, Extent size);
 
 // The buffer side of a copy; `buffer_bytes` is what there is from offset 0.
-std::string check_rows(const TextureInfo& texture, const BufferLayout& layout, Extent size, uint64_t buffer_bytes, const Limits& limits);
+std::string check_rows(const TextureInfo& texture, const BufferLayout& layout, Extent size, uint64_t buffer_bytes,
+                       const Limits& limits);
 
 // Counts a stage's entries against the floor.
 std::string check_counts(std::span<const std::vector<BindGroupLayoutEntry>> groups);

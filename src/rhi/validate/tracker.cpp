@@ -39,8 +39,8 @@ std::string Tracker::wrote(const TextureWrite& write) {
     for (uint32_t layer = first; layer < first + (volume ? 1 : write.size.depth); ++layer) {
         State& s = it->second[write.place.mip + layer * t->desc.mips];
         if (any(write.before) && write.before != s.allowed)
-            return formatted("write_texture: {} is said to be in {} before, but is in {}", name_of(*t, write.place.mip, layer),
-                             name(write.before), name(s.allowed));
+            return formatted("write_texture: {} is said to be in {} before, but is in {}",
+                             name_of(*t, write.place.mip, layer), name(write.before), name(s.allowed));
         s = {.allowed = write.after};
     }
     return {};
@@ -58,15 +58,18 @@ std::string Tracker::use(State& s, Access access, const std::string& what) {
             return {};
         }
         if (any(s.used))
-            return formatted("{} is written as {} after it was used as {}, without a barrier between", what, name(access), name(s.used));
+            return formatted("{} is written as {} after it was used as {}, without a barrier between", what,
+                             name(access), name(s.used));
         s = {.allowed = access, .used = access};
         return {};
     }
     if (!any(s.allowed)) return formatted("{} is used as {}, but no barrier ever gave it contents", what, name(access));
     if (!contains(s.allowed, access))
-        return formatted("{} is used as {}, but is ready for {}; a barrier is missing", what, name(access), name(s.allowed));
+        return formatted("{} is used as {}, but is ready for {}; a barrier is missing", what, name(access),
+                         name(s.allowed));
     if (writes(s.used))
-        return formatted("{} is used as {} after it was written as {}, without a barrier between", what, name(access), name(s.used));
+        return formatted("{} is used as {} after it was written as {}, without a barrier between", what, name(access),
+                         name(s.used));
     s.used |= access;
     return {};
 }
@@ -79,21 +82,25 @@ std::string Tracker::barrier(State& s, const Barrier& b, bool is_texture, const 
     const bool settled = s.settled;
     s = {.allowed = b.after};
     if (!contains(waits_for, pending))
-        return formatted("barrier on {}: it waits for {}, but the last access was {}", what, name(waits_for), name(pending));
+        return formatted("barrier on {}: it waits for {}, but the last access was {}", what, name(waits_for),
+                         name(pending));
     if (is_texture && any(b.before) && b.before != promised)
-        return formatted("barrier on {}: it is said to be in {} before, but is in {}", what, name(b.before), name(promised));
+        return formatted("barrier on {}: it is said to be in {} before, but is in {}", what, name(b.before),
+                         name(promised));
     if (!is_texture && !settled && any(b.before) && !any(promised) && !any(pending))
-        return formatted("barrier on {}: it is said to be in {} before, but no barrier ever gave it contents", what, name(b.before));
+        return formatted("barrier on {}: it is said to be in {} before, but no barrier ever gave it contents", what,
+                         name(b.before));
     return {};
 }
 
-std::string Tracker::end_aliases(HeapHandle heap, uint64_t begin, uint64_t end, const Barrier& b, const std::string& what) {
+std::string Tracker::end_aliases(HeapHandle heap, uint64_t begin, uint64_t end, const Barrier& b,
+                                 const std::string& what) {
     std::string fault;
     const auto hand_over = [&](State& s, const std::string& other) {
         const Access pending = any(s.used) ? s.used : s.allowed;
         if (!contains(b.alias_before, pending) && fault.empty())
-            fault = formatted("barrier on {}: it takes over the memory of {}, last accessed as {}, but waits for {}", what, other,
-                              name(pending), name(b.alias_before));
+            fault = formatted("barrier on {}: it takes over the memory of {}, last accessed as {}, but waits for {}",
+                              what, other, name(pending), name(b.alias_before));
         s = {};
     };
     objects_.buffers.for_each([&](BufferHandle h, BufferInfo& other) {
@@ -134,7 +141,8 @@ std::vector<std::string> Tracker::play(const Recording& recording) {
                 continue;
             }
             if (info->desc.heap && !any(e.barrier.before))
-                fault(end_aliases(info->desc.heap, info->desc.heap_offset, info->desc.heap_offset + info->need.size, e.barrier, what));
+                fault(end_aliases(info->desc.heap, info->desc.heap_offset, info->desc.heap_offset + info->need.size,
+                                  e.barrier, what));
             fault(barrier(s, e.barrier, false, what));
         } else {
             TextureInfo* info = objects_.textures.find(texture);
@@ -143,8 +151,8 @@ std::vector<std::string> Tracker::play(const Recording& recording) {
                 continue;
             }
             if (e.is_barrier && info->desc.heap && !any(e.barrier.before))
-                fault(end_aliases(info->desc.heap, info->desc.heap_offset, info->desc.heap_offset + info->need.size, e.barrier,
-                                  formatted("texture '{}'", info->label)));
+                fault(end_aliases(info->desc.heap, info->desc.heap_offset, info->desc.heap_offset + info->need.size,
+                                  e.barrier, formatted("texture '{}'", info->label)));
             std::vector<State>& states = textures_[texture.bits()];
             const Subresources r = e.is_barrier ? resolved(info->desc, e.barrier.range) : e.use.range;
             bool said = false;  // once a use, not once a mip and layer

@@ -73,7 +73,9 @@ RenderPass& VulkanEncoder::begin_render(const RenderPassDesc& desc) {
                : l == Load::Clear ? VK_ATTACHMENT_LOAD_OP_CLEAR
                                   : VK_ATTACHMENT_LOAD_OP_DONT_CARE;
     };
-    const auto store = [](Store s) { return s == Store::Store ? VK_ATTACHMENT_STORE_OP_STORE : VK_ATTACHMENT_STORE_OP_DONT_CARE; };
+    const auto store = [](Store s) {
+        return s == Store::Store ? VK_ATTACHMENT_STORE_OP_STORE : VK_ATTACHMENT_STORE_OP_DONT_CARE;
+    };
     std::array<VkRenderingAttachmentInfo, kMaxColorTargets> colors;
     VkRenderingAttachmentInfo depth{.sType = VK_STRUCTURE_TYPE_RENDERING_ATTACHMENT_INFO};
     VkRect2D area{};
@@ -160,7 +162,8 @@ void VulkanEncoder::set_pipeline(const Pipeline* p) {
 void VulkanEncoder::set_bind_group(uint32_t index, BindGroup handle, std::span<const uint32_t> dynamic_offsets) {
     const Group* g = device_.find(handle);
     if (!have(g)) return;
-    if (index >= kMaxBindGroups || dynamic_offsets.size() > 8) return fail({"set_bind_group: index or offsets out of range"});
+    if (index >= kMaxBindGroups || dynamic_offsets.size() > 8)
+        return fail({"set_bind_group: index or offsets out of range"});
     BoundGroup& bound = groups_[index];
     bound.set = g->vk;
     bound.offset_count = uint32_t(dynamic_offsets.size());
@@ -188,7 +191,8 @@ bool VulkanEncoder::apply() {
         g.dirty = false;
     }
     if (push_dirty_ && push_bytes_ > 0 && push_needed_ > 0) {
-        constexpr VkShaderStageFlags kAll = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT;
+        constexpr VkShaderStageFlags kAll =
+            VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT;
         vk_.vkCmdPushConstants(cmd_, layout_, kAll, 0, std::min(push_bytes_, push_needed_), push_.data());
         push_dirty_ = false;
     }
@@ -251,7 +255,8 @@ void VulkanEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset, 
 
 // ---- copies
 
-void VulkanEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset, uint64_t size) {
+void VulkanEncoder::copy_buffer(BufferHandle src, uint64_t src_offset, BufferHandle dst, uint64_t dst_offset,
+                                uint64_t size) {
     const Buffer* from = device_.find(src);
     const Buffer* to = device_.find(dst);
     if (!have(from) || !have(to) || size == 0) return;
@@ -357,18 +362,18 @@ void VulkanEncoder::barrier(BarrierKey, std::span<const Barrier> barriers) {
             const Texture* t = device_.find(b.texture);
             if (!have(t)) return;
             const Subresources r = resolved(t->desc, b.range);
-            image_barriers_.push_back({.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
-                                       .srcStageMask = before.stages,
-                                       .srcAccessMask = before.access,
-                                       .dstStageMask = after.stages,
-                                       .dstAccessMask = after.access,
-                                       .oldLayout = layout_of(b.before, t->desc),
-                                       .newLayout = layout_of(b.after, t->desc),
-                                       .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                       .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                       .image = t->vk,
-                                       .subresourceRange = {aspect(t->desc.format), r.base_mip, r.mip_count, r.base_layer,
-                                                            r.layer_count}});
+            image_barriers_.push_back(
+                {.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
+                 .srcStageMask = before.stages,
+                 .srcAccessMask = before.access,
+                 .dstStageMask = after.stages,
+                 .dstAccessMask = after.access,
+                 .oldLayout = layout_of(b.before, t->desc),
+                 .newLayout = layout_of(b.after, t->desc),
+                 .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+                 .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+                 .image = t->vk,
+                 .subresourceRange = {aspect(t->desc.format), r.base_mip, r.mip_count, r.base_layer, r.layer_count}});
         } else {
             const Buffer* buffer = device_.find(b.buffer);
             if (!have(buffer)) return;

@@ -5,20 +5,34 @@ namespace kiln::rhi::vulkan {
 
 VkFormat to_vk(Format format) {
     switch (format) {
-        case Format::Undefined: return VK_FORMAT_UNDEFINED;
-        case Format::R8Snorm: return VK_FORMAT_R8_SNORM;
-        case Format::R16Float: return VK_FORMAT_R16_SFLOAT;
-        case Format::R16Uint: return VK_FORMAT_R16_UINT;
-        case Format::R32Uint: return VK_FORMAT_R32_UINT;
-        case Format::R32Float: return VK_FORMAT_R32_SFLOAT;
-        case Format::Rg16Float: return VK_FORMAT_R16G16_SFLOAT;
-        case Format::Rg32Uint: return VK_FORMAT_R32G32_UINT;
-        case Format::Rgba8Unorm: return VK_FORMAT_R8G8B8A8_UNORM;
-        case Format::Rgba16Float: return VK_FORMAT_R16G16B16A16_SFLOAT;
-        case Format::Rgba32Float: return VK_FORMAT_R32G32B32A32_SFLOAT;
-        case Format::Rgba32Uint: return VK_FORMAT_R32G32B32A32_UINT;
-        case Format::R11g11b10Float: return VK_FORMAT_B10G11R11_UFLOAT_PACK32;
-        case Format::Depth32Float: return VK_FORMAT_D32_SFLOAT;
+    case Format::Undefined:
+        return VK_FORMAT_UNDEFINED;
+    case Format::R8Snorm:
+        return VK_FORMAT_R8_SNORM;
+    case Format::R16Float:
+        return VK_FORMAT_R16_SFLOAT;
+    case Format::R16Uint:
+        return VK_FORMAT_R16_UINT;
+    case Format::R32Uint:
+        return VK_FORMAT_R32_UINT;
+    case Format::R32Float:
+        return VK_FORMAT_R32_SFLOAT;
+    case Format::Rg16Float:
+        return VK_FORMAT_R16G16_SFLOAT;
+    case Format::Rg32Uint:
+        return VK_FORMAT_R32G32_UINT;
+    case Format::Rgba8Unorm:
+        return VK_FORMAT_R8G8B8A8_UNORM;
+    case Format::Rgba16Float:
+        return VK_FORMAT_R16G16B16A16_SFLOAT;
+    case Format::Rgba32Float:
+        return VK_FORMAT_R32G32B32A32_SFLOAT;
+    case Format::Rgba32Uint:
+        return VK_FORMAT_R32G32B32A32_UINT;
+    case Format::R11g11b10Float:
+        return VK_FORMAT_B10G11R11_UFLOAT_PACK32;
+    case Format::Depth32Float:
+        return VK_FORMAT_D32_SFLOAT;
     }
     return VK_FORMAT_UNDEFINED;
 }
@@ -64,85 +78,123 @@ VkShaderStageFlags to_vk(ShaderStage stages) {
 
 VkCompareOp to_vk(Compare compare) {
     switch (compare) {
-        case Compare::Never: return VK_COMPARE_OP_NEVER;
-        case Compare::Less: return VK_COMPARE_OP_LESS;
-        case Compare::Equal: return VK_COMPARE_OP_EQUAL;
-        case Compare::LessEqual: return VK_COMPARE_OP_LESS_OR_EQUAL;
-        case Compare::Greater: return VK_COMPARE_OP_GREATER;
-        case Compare::NotEqual: return VK_COMPARE_OP_NOT_EQUAL;
-        case Compare::GreaterEqual: return VK_COMPARE_OP_GREATER_OR_EQUAL;
-        case Compare::Always: return VK_COMPARE_OP_ALWAYS;
+    case Compare::Never:
+        return VK_COMPARE_OP_NEVER;
+    case Compare::Less:
+        return VK_COMPARE_OP_LESS;
+    case Compare::Equal:
+        return VK_COMPARE_OP_EQUAL;
+    case Compare::LessEqual:
+        return VK_COMPARE_OP_LESS_OR_EQUAL;
+    case Compare::Greater:
+        return VK_COMPARE_OP_GREATER;
+    case Compare::NotEqual:
+        return VK_COMPARE_OP_NOT_EQUAL;
+    case Compare::GreaterEqual:
+        return VK_COMPARE_OP_GREATER_OR_EQUAL;
+    case Compare::Always:
+        return VK_COMPARE_OP_ALWAYS;
     }
     return VK_COMPARE_OP_ALWAYS;
 }
 
 VkFormat to_vk(VertexFormat format) {
     switch (format) {
-        case VertexFormat::Float32: return VK_FORMAT_R32_SFLOAT;
-        case VertexFormat::Float32x2: return VK_FORMAT_R32G32_SFLOAT;
-        case VertexFormat::Float32x3: return VK_FORMAT_R32G32B32_SFLOAT;
-        case VertexFormat::Float32x4: return VK_FORMAT_R32G32B32A32_SFLOAT;
-        case VertexFormat::Unorm8x4: return VK_FORMAT_R8G8B8A8_UNORM;
-        case VertexFormat::Uint32: return VK_FORMAT_R32_UINT;
+    case VertexFormat::Float32:
+        return VK_FORMAT_R32_SFLOAT;
+    case VertexFormat::Float32x2:
+        return VK_FORMAT_R32G32_SFLOAT;
+    case VertexFormat::Float32x3:
+        return VK_FORMAT_R32G32B32_SFLOAT;
+    case VertexFormat::Float32x4:
+        return VK_FORMAT_R32G32B32A32_SFLOAT;
+    case VertexFormat::Unorm8x4:
+        return VK_FORMAT_R8G8B8A8_UNORM;
+    case VertexFormat::Uint32:
+        return VK_FORMAT_R32_UINT;
     }
     return VK_FORMAT_UNDEFINED;
 }
 
 VkBlendFactor to_vk(BlendFactor factor) {
     switch (factor) {
-        case BlendFactor::Zero: return VK_BLEND_FACTOR_ZERO;
-        case BlendFactor::One: return VK_BLEND_FACTOR_ONE;
-        case BlendFactor::SrcAlpha: return VK_BLEND_FACTOR_SRC_ALPHA;
-        case BlendFactor::OneMinusSrcAlpha: return VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
-        case BlendFactor::DstAlpha: return VK_BLEND_FACTOR_DST_ALPHA;
-        case BlendFactor::OneMinusDstAlpha: return VK_BLEND_FACTOR_ONE_MINUS_DST_ALPHA;
-        case BlendFactor::SrcColor: return VK_BLEND_FACTOR_SRC_COLOR;
-        case BlendFactor::DstColor: return VK_BLEND_FACTOR_DST_COLOR;
+    case BlendFactor::Zero:
+        return VK_BLEND_FACTOR_ZERO;
+    case BlendFactor::One:
+        return VK_BLEND_FACTOR_ONE;
+    case BlendFactor::SrcAlpha:
+        return VK_BLEND_FACTOR_SRC_ALPHA;
+    case BlendFactor::OneMinusSrcAlpha:
+        return VK_BLEND_FACTOR_ONE_MINUS_SRC_ALPHA;
+    case BlendFactor::DstAlpha:
+        return VK_BLEND_FACTOR_DST_ALPHA;
+    case BlendFactor::OneMinusDstAlpha:
+        return VK_BLEND_FACTOR_ONE_MINUS_DST_ALPHA;
+    case BlendFactor::SrcColor:
+        return VK_BLEND_FACTOR_SRC_COLOR;
+    case BlendFactor::DstColor:
+        return VK_BLEND_FACTOR_DST_COLOR;
     }
     return VK_BLEND_FACTOR_ONE;
 }
 
 VkBlendOp to_vk(BlendOp op) {
     switch (op) {
-        case BlendOp::Add: return VK_BLEND_OP_ADD;
-        case BlendOp::Subtract: return VK_BLEND_OP_SUBTRACT;
-        case BlendOp::ReverseSubtract: return VK_BLEND_OP_REVERSE_SUBTRACT;
-        case BlendOp::Min: return VK_BLEND_OP_MIN;
-        case BlendOp::Max: return VK_BLEND_OP_MAX;
+    case BlendOp::Add:
+        return VK_BLEND_OP_ADD;
+    case BlendOp::Subtract:
+        return VK_BLEND_OP_SUBTRACT;
+    case BlendOp::ReverseSubtract:
+        return VK_BLEND_OP_REVERSE_SUBTRACT;
+    case BlendOp::Min:
+        return VK_BLEND_OP_MIN;
+    case BlendOp::Max:
+        return VK_BLEND_OP_MAX;
     }
     return VK_BLEND_OP_ADD;
 }
 
 VkPrimitiveTopology to_vk(Topology topology) {
     switch (topology) {
-        case Topology::TriangleList: return VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
-        case Topology::TriangleStrip: return VK_PRIMITIVE_TOPOLOGY_TRIANGLE_STRIP;
-        case Topology::LineList: return VK_PRIMITIVE_TOPOLOGY_LINE_LIST;
-        case Topology::LineStrip: return VK_PRIMITIVE_TOPOLOGY_LINE_STRIP;
-        case Topology::PointList: return VK_PRIMITIVE_TOPOLOGY_POINT_LIST;
+    case Topology::TriangleList:
+        return VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
+    case Topology::TriangleStrip:
+        return VK_PRIMITIVE_TOPOLOGY_TRIANGLE_STRIP;
+    case Topology::LineList:
+        return VK_PRIMITIVE_TOPOLOGY_LINE_LIST;
+    case Topology::LineStrip:
+        return VK_PRIMITIVE_TOPOLOGY_LINE_STRIP;
+    case Topology::PointList:
+        return VK_PRIMITIVE_TOPOLOGY_POINT_LIST;
     }
     return VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST;
 }
 
 VkDescriptorType to_vk(const BindGroupLayoutEntry& entry) {
     switch (entry.kind) {
-        case BindingKind::UniformBuffer:
-            return entry.dynamic_offset ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
-        case BindingKind::StorageBuffer:
-        case BindingKind::StorageBufferReadOnly:
-            return entry.dynamic_offset ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER_DYNAMIC : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-        case BindingKind::SampledTexture: return VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
-        case BindingKind::Sampler: return VK_DESCRIPTOR_TYPE_SAMPLER;
-        case BindingKind::StorageTexture:
-        case BindingKind::StorageTextureReadOnly: return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+    case BindingKind::UniformBuffer:
+        return entry.dynamic_offset ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+    case BindingKind::StorageBuffer:
+    case BindingKind::StorageBufferReadOnly:
+        return entry.dynamic_offset ? VK_DESCRIPTOR_TYPE_STORAGE_BUFFER_DYNAMIC : VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+    case BindingKind::SampledTexture:
+        return VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
+    case BindingKind::Sampler:
+        return VK_DESCRIPTOR_TYPE_SAMPLER;
+    case BindingKind::StorageTexture:
+    case BindingKind::StorageTextureReadOnly:
+        return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
     }
     return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
 }
 
-VkImageAspectFlags aspect(Format format) { return is_depth(format) ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT; }
+VkImageAspectFlags aspect(Format format) {
+    return is_depth(format) ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT;
+}
 
 Sync sync_of(Access access) {
-    constexpr VkPipelineStageFlags2 kGraphics = VK_PIPELINE_STAGE_2_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_2_FRAGMENT_SHADER_BIT;
+    constexpr VkPipelineStageFlags2 kGraphics =
+        VK_PIPELINE_STAGE_2_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_2_FRAGMENT_SHADER_BIT;
     constexpr VkPipelineStageFlags2 kCompute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
     constexpr VkPipelineStageFlags2 kDepth =
         VK_PIPELINE_STAGE_2_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_2_LATE_FRAGMENT_TESTS_BIT;
@@ -194,25 +246,44 @@ VkImageLayout layout_of(Access access, const TextureDesc& desc) {
 
 std::string name(VkResult result) {
     switch (result) {
-        case VK_SUCCESS: return "VK_SUCCESS";
-        case VK_NOT_READY: return "VK_NOT_READY";
-        case VK_TIMEOUT: return "VK_TIMEOUT";
-        case VK_INCOMPLETE: return "VK_INCOMPLETE";
-        case VK_ERROR_OUT_OF_HOST_MEMORY: return "out of host memory";
-        case VK_ERROR_OUT_OF_DEVICE_MEMORY: return "out of device memory";
-        case VK_ERROR_INITIALIZATION_FAILED: return "VK_ERROR_INITIALIZATION_FAILED";
-        case VK_ERROR_DEVICE_LOST: return "the device was lost";
-        case VK_ERROR_MEMORY_MAP_FAILED: return "VK_ERROR_MEMORY_MAP_FAILED";
-        case VK_ERROR_LAYER_NOT_PRESENT: return "VK_ERROR_LAYER_NOT_PRESENT";
-        case VK_ERROR_EXTENSION_NOT_PRESENT: return "VK_ERROR_EXTENSION_NOT_PRESENT";
-        case VK_ERROR_FEATURE_NOT_PRESENT: return "VK_ERROR_FEATURE_NOT_PRESENT";
-        case VK_ERROR_INCOMPATIBLE_DRIVER: return "VK_ERROR_INCOMPATIBLE_DRIVER";
-        case VK_ERROR_TOO_MANY_OBJECTS: return "VK_ERROR_TOO_MANY_OBJECTS";
-        case VK_ERROR_FORMAT_NOT_SUPPORTED: return "the driver does not support the format so";
-        case VK_ERROR_FRAGMENTED_POOL: return "VK_ERROR_FRAGMENTED_POOL";
-        case VK_ERROR_OUT_OF_POOL_MEMORY: return "VK_ERROR_OUT_OF_POOL_MEMORY";
-        case VK_ERROR_INVALID_SHADER_NV: return "the driver refused the shader";
-        default: return "VkResult " + std::to_string(int(result));
+    case VK_SUCCESS:
+        return "VK_SUCCESS";
+    case VK_NOT_READY:
+        return "VK_NOT_READY";
+    case VK_TIMEOUT:
+        return "VK_TIMEOUT";
+    case VK_INCOMPLETE:
+        return "VK_INCOMPLETE";
+    case VK_ERROR_OUT_OF_HOST_MEMORY:
+        return "out of host memory";
+    case VK_ERROR_OUT_OF_DEVICE_MEMORY:
+        return "out of device memory";
+    case VK_ERROR_INITIALIZATION_FAILED:
+        return "VK_ERROR_INITIALIZATION_FAILED";
+    case VK_ERROR_DEVICE_LOST:
+        return "the device was lost";
+    case VK_ERROR_MEMORY_MAP_FAILED:
+        return "VK_ERROR_MEMORY_MAP_FAILED";
+    case VK_ERROR_LAYER_NOT_PRESENT:
+        return "VK_ERROR_LAYER_NOT_PRESENT";
+    case VK_ERROR_EXTENSION_NOT_PRESENT:
+        return "VK_ERROR_EXTENSION_NOT_PRESENT";
+    case VK_ERROR_FEATURE_NOT_PRESENT:
+        return "VK_ERROR_FEATURE_NOT_PRESENT";
+    case VK_ERROR_INCOMPATIBLE_DRIVER:
+        return "VK_ERROR_INCOMPATIBLE_DRIVER";
+    case VK_ERROR_TOO_MANY_OBJECTS:
+        return "VK_ERROR_TOO_MANY_OBJECTS";
+    case VK_ERROR_FORMAT_NOT_SUPPORTED:
+        return "the driver does not support the format so";
+    case VK_ERROR_FRAGMENTED_POOL:
+        return "VK_ERROR_FRAGMENTED_POOL";
+    case VK_ERROR_OUT_OF_POOL_MEMORY:
+        return "VK_ERROR_OUT_OF_POOL_MEMORY";
+    case VK_ERROR_INVALID_SHADER_NV:
+        return "the driver refused the shader";
+    default:
+        return "VkResult " + std::to_string(int(result));
     }
 }
 

@@ -22,8 +22,10 @@ VulkanDevice::VulkanDevice(std::unique_ptr<Instance> instance, Adapter adapter)
 Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     const VkPhysicalDevice physical = adapter_.physical;
     VkPhysicalDeviceVulkan13Features has13{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
-    VkPhysicalDeviceVulkan12Features has12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, .pNext = &has13};
-    VkPhysicalDeviceVulkan11Features has11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES, .pNext = &has12};
+    VkPhysicalDeviceVulkan12Features has12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+                                           .pNext = &has13};
+    VkPhysicalDeviceVulkan11Features has11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
+                                           .pNext = &has12};
     VkPhysicalDeviceFeatures2 has{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, .pNext = &has11};
     vkGetPhysicalDeviceFeatures2(physical, &has);
 
@@ -32,14 +34,16 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     want13.dynamicRendering = VK_TRUE;
     want13.synchronization2 = VK_TRUE;
     want13.maintenance4 = has13.maintenance4;
-    VkPhysicalDeviceVulkan12Features want12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, .pNext = &want13};
+    VkPhysicalDeviceVulkan12Features want12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+                                            .pNext = &want13};
     want12.timelineSemaphore = VK_TRUE;
     want12.scalarBlockLayout = has12.scalarBlockLayout;
     want12.shaderBufferInt64Atomics = has12.shaderBufferInt64Atomics;
     want12.bufferDeviceAddress = has12.bufferDeviceAddress;
     want12.samplerFilterMinmax = has12.samplerFilterMinmax;
     want12.vulkanMemoryModel = has12.vulkanMemoryModel;
-    VkPhysicalDeviceVulkan11Features want11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES, .pNext = &want12};
+    VkPhysicalDeviceVulkan11Features want11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
+                                            .pNext = &want12};
     want11.shaderDrawParameters = has11.shaderDrawParameters;
     VkPhysicalDeviceFeatures2 want{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, .pNext = &want11};
     want.features.shaderStorageImageExtendedFormats = has.features.shaderStorageImageExtendedFormats;
@@ -111,18 +115,21 @@ void VulkanDevice::find_caps() {
         vkGetPhysicalDeviceFormatProperties(physical, to_vk(format), &p);
         return (p.optimalTilingFeatures & wanted) == wanted;
     };
-    for (const Format f : {Format::R16Float, Format::R16Uint, Format::Rg16Float, Format::Rg32Uint, Format::R8Snorm, Format::R11g11b10Float})
+    for (const Format f : {Format::R16Float, Format::R16Uint, Format::Rg16Float, Format::Rg32Uint, Format::R8Snorm,
+                           Format::R11g11b10Float})
         caps_.storage_r16f = caps_.storage_r16f && can(f, VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT);
     caps_.float32_filter = can(Format::R32Float, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT) &&
                            can(Format::Rgba32Float, VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT);
 
     VkPhysicalDeviceVulkan11Properties p11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES};
-    VkPhysicalDeviceVulkan13Properties p13{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES, .pNext = &p11};
+    VkPhysicalDeviceVulkan13Properties p13{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES,
+                                           .pNext = &p11};
     VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, .pNext = &p13};
     vkGetPhysicalDeviceProperties2(physical, &properties);
     limits_.timestamp_period_ns = double(l.timestampPeriod);
     limits_.max_storage_binding = l.maxStorageBufferRange;
-    limits_.max_buffer = p13.maxBufferSize ? std::min(p13.maxBufferSize, p11.maxMemoryAllocationSize) : p11.maxMemoryAllocationSize;
+    limits_.max_buffer =
+        p13.maxBufferSize ? std::min(p13.maxBufferSize, p11.maxMemoryAllocationSize) : p11.maxMemoryAllocationSize;
     limits_.max_texture_2d = l.maxImageDimension2D;
     limits_.max_texture_3d = l.maxImageDimension3D;
     limits_.subgroup_size = p11.subgroupSize;
@@ -144,7 +151,8 @@ VulkanDevice::~VulkanDevice() {
         sweep(compute_);
         sweep(render_);
         sweep(layouts_);
-        group_layouts_.for_each([&](BindGroupLayout, GroupLayout& l) { vk_.vkDestroyDescriptorSetLayout(device_, l.vk, nullptr); });
+        group_layouts_.for_each(
+            [&](BindGroupLayout, GroupLayout& l) { vk_.vkDestroyDescriptorSetLayout(device_, l.vk, nullptr); });
         sweep(shaders_);
         sweep(samplers_);
         views_.for_each([&](ViewHandle h, View& v) {
@@ -198,10 +206,8 @@ bool VulkanDevice::completed(SubmitId id) { return id <= finished_ || id <= fini
 
 Result<void> VulkanDevice::wait(SubmitId id) {
     if (id > last_submit_) return Error{formatted("wait: submit {} was never made", id)};
-    const VkSemaphoreWaitInfo info{.sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO,
-                                   .semaphoreCount = 1,
-                                   .pSemaphores = &timeline_,
-                                   .pValues = &id};
+    const VkSemaphoreWaitInfo info{
+        .sType = VK_STRUCTURE_TYPE_SEMAPHORE_WAIT_INFO, .semaphoreCount = 1, .pSemaphores = &timeline_, .pValues = &id};
     // No time limit of ours: a software device may take a minute; a hung one is reported by its driver as lost.
     if (const VkResult r = vk_.vkWaitSemaphores(device_, &info, UINT64_MAX); r != VK_SUCCESS) return fail("wait", r);
     collect();
@@ -300,7 +306,8 @@ Result<void> VulkanDevice::write_buffer(BufferHandle buffer, uint64_t offset, st
     const Buffer* b = find(buffer);
     if (!b) return Error{"write_buffer: stale buffer handle"};
     if (offset > b->desc.size || bytes.size() > b->desc.size - offset)
-        return Error{formatted("write_buffer: {} B at {} go past the end of '{}' ({} B)", bytes.size(), offset, b->label, b->desc.size)};
+        return Error{formatted("write_buffer: {} B at {} go past the end of '{}' ({} B)", bytes.size(), offset,
+                               b->label, b->desc.size)};
     return uploads_.to_buffer(b->vk, offset, bytes);
 }
 
@@ -345,8 +352,8 @@ MemoryStats VulkanDevice::memory_stats() const {
 }
 
 uint32_t VulkanDevice::live_handle_count() const {
-    uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() + groups_.size() +
-                     layouts_.size() + compute_.size() + render_.size() + queries_.size();
+    uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
+                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + queries_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;

@@ -27,7 +27,8 @@ VKAPI_ATTR VkBool32 VKAPI_CALL on_message(VkDebugUtilsMessageSeverityFlagBitsEXT
 
 VkDebugUtilsMessengerCreateInfoEXT messenger_info(Instance* self) {
     VkDebugUtilsMessengerCreateInfoEXT info{.sType = VK_STRUCTURE_TYPE_DEBUG_UTILS_MESSENGER_CREATE_INFO_EXT};
-    info.messageSeverity = VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
+    info.messageSeverity =
+        VK_DEBUG_UTILS_MESSAGE_SEVERITY_WARNING_BIT_EXT | VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
     info.messageType = VK_DEBUG_UTILS_MESSAGE_TYPE_VALIDATION_BIT_EXT;
     info.pfnUserCallback = on_message;
     info.pUserData = self;
@@ -47,7 +48,8 @@ bool has_extension(const char* layer, const char* wanted) {
     vkEnumerateInstanceExtensionProperties(layer, &count, nullptr);
     std::vector<VkExtensionProperties> found(count);
     vkEnumerateInstanceExtensionProperties(layer, &count, found.data());
-    return std::any_of(found.begin(), found.end(), [&](const auto& e) { return !std::strcmp(e.extensionName, wanted); });
+    return std::any_of(found.begin(), found.end(),
+                       [&](const auto& e) { return !std::strcmp(e.extensionName, wanted); });
 }
 
 std::string version(uint32_t v) {
@@ -57,17 +59,23 @@ std::string version(uint32_t v) {
 
 DeviceKind kind_of(VkPhysicalDeviceType type) {
     switch (type) {
-        case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU: return DeviceKind::Discrete;
-        case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU: return DeviceKind::Integrated;
-        case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU: return DeviceKind::Virtual;
-        case VK_PHYSICAL_DEVICE_TYPE_CPU: return DeviceKind::Cpu;
-        default: return DeviceKind::Other;
+    case VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU:
+        return DeviceKind::Discrete;
+    case VK_PHYSICAL_DEVICE_TYPE_INTEGRATED_GPU:
+        return DeviceKind::Integrated;
+    case VK_PHYSICAL_DEVICE_TYPE_VIRTUAL_GPU:
+        return DeviceKind::Virtual;
+    case VK_PHYSICAL_DEVICE_TYPE_CPU:
+        return DeviceKind::Cpu;
+    default:
+        return DeviceKind::Other;
     }
 }
 
 // Empty, or why we cannot run on it.
 std::string missing(VkPhysicalDevice device, const VkPhysicalDeviceProperties& properties) {
-    if (properties.apiVersion < VK_API_VERSION_1_3) return "Vulkan " + version(properties.apiVersion) + "; 1.3 is needed";
+    if (properties.apiVersion < VK_API_VERSION_1_3)
+        return "Vulkan " + version(properties.apiVersion) + "; 1.3 is needed";
     VkPhysicalDeviceVulkan13Features v13{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES};
     VkPhysicalDeviceVulkan12Features v12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES, .pNext = &v13};
     VkPhysicalDeviceFeatures2 features{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, .pNext = &v12};
@@ -94,7 +102,8 @@ Adapter describe(VkPhysicalDevice device) {
     VkPhysicalDeviceMemoryProperties memory;
     vkGetPhysicalDeviceMemoryProperties(device, &memory);
     for (uint32_t i = 0; i < memory.memoryHeapCount; ++i)
-        if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT) out.info.memory_bytes += memory.memoryHeaps[i].size;
+        if (memory.memoryHeaps[i].flags & VK_MEMORY_HEAP_DEVICE_LOCAL_BIT)
+            out.info.memory_bytes += memory.memoryHeaps[i].size;
 
     uint32_t count = 0;
     vkGetPhysicalDeviceQueueFamilyProperties(device, &count, nullptr);
@@ -116,11 +125,16 @@ Adapter describe(VkPhysicalDevice device) {
 
 int rank(DeviceKind kind) {
     switch (kind) {
-        case DeviceKind::Discrete: return 0;
-        case DeviceKind::Integrated: return 1;
-        case DeviceKind::Virtual: return 2;
-        case DeviceKind::Cpu: return 3;
-        case DeviceKind::Other: return 4;
+    case DeviceKind::Discrete:
+        return 0;
+    case DeviceKind::Integrated:
+        return 1;
+    case DeviceKind::Virtual:
+        return 2;
+    case DeviceKind::Cpu:
+        return 3;
+    case DeviceKind::Other:
+        return 4;
     }
     return 5;
 }
@@ -140,9 +154,11 @@ Result<std::unique_ptr<Instance>> Instance::create(bool validation) {
     // The driver reads this when the loader opens it, in vkCreateInstance. A value set by the user stays.
     setenv("LP_NATIVE_VECTOR_WIDTH", "256", 0);
     if (volkInitialize() != VK_SUCCESS)
-        return Error{std::string("no Vulkan loader (libvulkan.so.1): apt install libvulkan1 mesa-vulkan-drivers"), ErrorKind::NoDevice};
+        return Error{std::string("no Vulkan loader (libvulkan.so.1): apt install libvulkan1 mesa-vulkan-drivers"),
+                     ErrorKind::NoDevice};
     if (volkGetInstanceVersion() < VK_API_VERSION_1_3)
-        return Error{"the Vulkan loader is of version " + version(volkGetInstanceVersion()) + "; 1.3 is needed", ErrorKind::NoDevice};
+        return Error{"the Vulkan loader is of version " + version(volkGetInstanceVersion()) + "; 1.3 is needed",
+                     ErrorKind::NoDevice};
 
     std::unique_ptr<Instance> out(new Instance);
     std::vector<const char*> layers;
@@ -203,7 +219,8 @@ Instance::~Instance() {
     if (!instance_) return;
     const std::lock_guard lock(volk_mutex());
     if (messenger_) {
-        const auto destroy = PFN_vkDestroyDebugUtilsMessengerEXT(vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
+        const auto destroy =
+            PFN_vkDestroyDebugUtilsMessengerEXT(vkGetInstanceProcAddr(instance_, "vkDestroyDebugUtilsMessengerEXT"));
         destroy(instance_, messenger_, nullptr);
     }
     vkDestroyInstance(instance_, nullptr);
@@ -218,7 +235,8 @@ Result<void> Instance::find_adapters() {
     VkResult result = vkEnumeratePhysicalDevices(instance_, &count, nullptr);
     std::vector<VkPhysicalDevice> devices(count);
     if (result == VK_SUCCESS) result = vkEnumeratePhysicalDevices(instance_, &count, devices.data());
-    if (result != VK_SUCCESS || count == 0) return Error{std::string("no Vulkan driver: ") + kHowToInstall, ErrorKind::NoDevice};
+    if (result != VK_SUCCESS || count == 0)
+        return Error{std::string("no Vulkan driver: ") + kHowToInstall, ErrorKind::NoDevice};
     for (const VkPhysicalDevice device : devices) adapters_.push_back(describe(device));
     std::stable_sort(adapters_.begin(), adapters_.end(),
                      [](const Adapter& a, const Adapter& b) { return rank(a.info.kind) < rank(b.info.kind); });

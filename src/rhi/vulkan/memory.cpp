@@ -58,7 +58,8 @@ uint32_t Memory::pick_type(uint32_t type_bits, MemoryKind kind) const {
     return best;
 }
 
-Result<Block*> Memory::add_block(uint64_t size, uint32_t type, MemoryKind kind, bool images, bool alone, std::string_view what) {
+Result<Block*> Memory::add_block(uint64_t size, uint32_t type, MemoryKind kind, bool images, bool alone,
+                                 std::string_view what) {
     const uint32_t heap = properties_.memoryTypes[type].heapIndex;
     // Some drivers promise more than the heap has and fail later, in the middle of a frame.
     if (reserved_[heap] + size > properties_.memoryHeaps[heap].size)
@@ -70,7 +71,8 @@ Result<Block*> Memory::add_block(uint64_t size, uint32_t type, MemoryKind kind, 
         return failure(what, result);
     void* mapped = nullptr;
     if (kind != MemoryKind::Device) {
-        if (const VkResult result = vk_->vkMapMemory(device_, memory, 0, VK_WHOLE_SIZE, 0, &mapped); result != VK_SUCCESS) {
+        if (const VkResult result = vk_->vkMapMemory(device_, memory, 0, VK_WHOLE_SIZE, 0, &mapped);
+            result != VK_SUCCESS) {
             vk_->vkFreeMemory(device_, memory, nullptr);
             return failure(what, result);
         }
@@ -86,10 +88,12 @@ void Memory::free_block(std::list<Block>::iterator it) {
     blocks_.erase(it);
 }
 
-Result<Allocation> Memory::allocate(const VkMemoryRequirements& need, MemoryKind kind, bool images, std::string_view what) {
+Result<Allocation> Memory::allocate(const VkMemoryRequirements& need, MemoryKind kind, bool images,
+                                    std::string_view what) {
     const uint32_t type = pick_type(need.memoryTypeBits, kind);
     if (type == kRemaining) return Error{std::string(what) + ": the driver has no fitting kind of memory"};
-    const uint64_t block_size = block_bytes(properties_.memoryHeaps[properties_.memoryTypes[type].heapIndex].size, kind);
+    const uint64_t block_size =
+        block_bytes(properties_.memoryHeaps[properties_.memoryTypes[type].heapIndex].size, kind);
 
     Block* block = nullptr;
     std::optional<uint64_t> offset;

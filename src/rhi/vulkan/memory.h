@@ -51,7 +51,8 @@ public:
 
 private:
     uint32_t pick_type(uint32_t type_bits, MemoryKind kind) const;
-    Result<Block*> add_block(uint64_t size, uint32_t type, MemoryKind kind, bool images, bool alone, std::string_view what);
+    Result<Block*> add_block(uint64_t size, uint32_t type, MemoryKind kind, bool images, bool alone,
+                             std::string_view what);
     void free_block(std::list<Block>::iterator it);
 
     VkDevice device_ = VK_NULL_HANDLE;

@@ -42,7 +42,8 @@ std::vector<std::byte> load_cache(const std::string& path) {
     if (!file.read(reinterpret_cast<char*>(&header), sizeof header)) return {};
     std::error_code error;
     const uint64_t file_size = std::filesystem::file_size(path, error);
-    if (error || std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != file_size - sizeof header) return {};
+    if (error || std::memcmp(header.magic, kMagic, sizeof kMagic) != 0 || header.size != file_size - sizeof header)
+        return {};
     std::vector<std::byte> bytes(header.size);
     if (!file.read(reinterpret_cast<char*>(bytes.data()), std::streamsize(bytes.size()))) return {};
     if (hash128(bytes) != header.hash) return {};

@@ -11,7 +11,8 @@ namespace {
 constexpr uint32_t kSetsPerPool = 256;
 
 bool is_buffer(BindingKind kind) {
-    return kind == BindingKind::UniformBuffer || kind == BindingKind::StorageBuffer || kind == BindingKind::StorageBufferReadOnly;
+    return kind == BindingKind::UniformBuffer || kind == BindingKind::StorageBuffer ||
+           kind == BindingKind::StorageBufferReadOnly;
 }
 
 // Specialisation constants as Vulkan wants them; keeps the arrays they point to.
@@ -32,7 +33,8 @@ struct Specialization {
 
 Result<ShaderModule> VulkanDevice::create_shader_module(const ShaderModuleDesc& desc) {
     Result<Reflection> reflection = reflect_spirv(desc.spirv);
-    if (!reflection) return Error{formatted("shader module '{}': {}", desc.label, reflection.error().message), ErrorKind::Input};
+    if (!reflection)
+        return Error{formatted("shader module '{}': {}", desc.label, reflection.error().message), ErrorKind::Input};
     const VkShaderModuleCreateInfo info{.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO,
                                         .codeSize = desc.spirv.size_bytes(),
                                         .pCode = desc.spirv.data()};
@@ -50,7 +52,8 @@ Result<BindGroupLayout> VulkanDevice::create_bind_group_layout(const BindGroupLa
 Result<BindGroupLayout> VulkanDevice::make_group_layout(const BindGroupLayoutDesc& desc, bool owned) {
     std::vector<VkDescriptorSetLayoutBinding> bindings;
     for (const BindGroupLayoutEntry& e : desc.entries)
-        bindings.push_back({.binding = e.binding, .descriptorType = to_vk(e), .descriptorCount = 1, .stageFlags = to_vk(e.stages)});
+        bindings.push_back(
+            {.binding = e.binding, .descriptorType = to_vk(e), .descriptorCount = 1, .stageFlags = to_vk(e.stages)});
     const VkDescriptorSetLayoutCreateInfo info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO,
                                                .bindingCount = uint32_t(bindings.size()),
                                                .pBindings = bindings.data()};
@@ -62,9 +65,8 @@ Result<BindGroupLayout> VulkanDevice::make_group_layout(const BindGroupLayoutDes
 }
 
 Result<VkDescriptorSet> VulkanDevice::allocate_set(VkDescriptorSetLayout layout, VkDescriptorPool& pool) {
-    VkDescriptorSetAllocateInfo info{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO,
-                                     .descriptorSetCount = 1,
-                                     .pSetLayouts = &layout};
+    VkDescriptorSetAllocateInfo info{
+        .sType = VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO, .descriptorSetCount = 1, .pSetLayouts = &layout};
     VkDescriptorSet out = VK_NULL_HANDLE;
     VkResult r = VK_ERROR_OUT_OF_POOL_MEMORY;
     for (size_t i = set_pools_.size(); i-- > 0;) {
@@ -75,9 +77,12 @@ Result<VkDescriptorSet> VulkanDevice::allocate_set(VkDescriptorSetLayout layout,
     }
     // Room for the fullest groups that the floor allows, on average a quarter of that.
     const VkDescriptorPoolSize sizes[] = {
-        {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * kSetsPerPool},        {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 8 * kSetsPerPool},
-        {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, kSetsPerPool},    {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER_DYNAMIC, kSetsPerPool},
-        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, 8 * kSetsPerPool},         {VK_DESCRIPTOR_TYPE_SAMPLER, 2 * kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 8 * kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER_DYNAMIC, kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE, 8 * kSetsPerPool},
+        {VK_DESCRIPTOR_TYPE_SAMPLER, 2 * kSetsPerPool},
         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4 * kSetsPerPool},
     };
     const VkDescriptorPoolCreateInfo create{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
@@ -104,14 +109,16 @@ Result<BindGroup> VulkanDevice::create_bind_group(const BindGroupDesc& desc) {
         const BindGroupEntry& entry = desc.entries[i];
         const auto slot = std::find_if(layout->entries.begin(), layout->entries.end(),
                                        [&](const BindGroupLayoutEntry& e) { return e.binding == entry.binding; });
-        if (slot == layout->entries.end()) return Error{formatted("{}: the layout has no binding {}", what, entry.binding)};
+        if (slot == layout->entries.end())
+            return Error{formatted("{}: the layout has no binding {}", what, entry.binding)};
         VkWriteDescriptorSet write{.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET,
                                    .dstBinding = entry.binding,
                                    .descriptorCount = 1,
                                    .descriptorType = to_vk(*slot)};
         if (is_buffer(slot->kind)) {
             const Buffer* b = find(entry.buffer);
-            if (!b || entry.offset >= b->desc.size) return Error{formatted("{}: binding {} has no buffer or starts past its end", what, entry.binding)};
+            if (!b || entry.offset >= b->desc.size)
+                return Error{formatted("{}: binding {} has no buffer or starts past its end", what, entry.binding)};
             buffers[i] = {b->vk, entry.offset, std::min(entry.size, b->desc.size - entry.offset)};
             write.pBufferInfo = &buffers[i];
         } else if (slot->kind == BindingKind::Sampler) {
@@ -148,15 +155,16 @@ Result<VkPipelineLayout> VulkanDevice::make_layout(std::span<const BindGroupLayo
         if (!l) return Error{"pipeline layout: stale bind group layout"};
         sets.push_back(l->vk);
     }
-    const VkPushConstantRange push{VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT, 0,
-                                   push_bytes};
+    const VkPushConstantRange push{
+        VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
     const VkPipelineLayoutCreateInfo info{.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
                                           .setLayoutCount = uint32_t(sets.size()),
                                           .pSetLayouts = sets.data(),
                                           .pushConstantRangeCount = push_bytes > 0 ? 1u : 0u,
                                           .pPushConstantRanges = &push};
     VkPipelineLayout out = VK_NULL_HANDLE;
-    if (const VkResult r = vk_.vkCreatePipelineLayout(device_, &info, nullptr, &out); r != VK_SUCCESS) return fail("pipeline layout", r);
+    if (const VkResult r = vk_.vkCreatePipelineLayout(device_, &info, nullptr, &out); r != VK_SUCCESS)
+        return fail("pipeline layout", r);
     return out;
 }
 
@@ -167,7 +175,8 @@ Result<PipelineLayout> VulkanDevice::create_pipeline_layout(const PipelineLayout
     return layouts_.insert({std::string(desc.label), {desc.groups.begin(), desc.groups.end()}, *vk});
 }
 
-Result<void> VulkanDevice::choose_layout(Pipeline& out, PipelineLayout wanted, std::span<const Reflection* const> shaders) {
+Result<void> VulkanDevice::choose_layout(Pipeline& out, PipelineLayout wanted,
+                                         std::span<const Reflection* const> shaders) {
     if (wanted) {
         const Layout* l = found(layouts_.get(wanted), "pipeline layout");
         if (!l) return Error{formatted("pipeline '{}': stale layout", out.label)};
@@ -176,7 +185,8 @@ Result<void> VulkanDevice::choose_layout(Pipeline& out, PipelineLayout wanted, s
         out.owns_layout = false;
         return {};
     }
-    auto groups = auto_layouts_.groups(shaders, [&](const BindGroupLayoutDesc& d) { return make_group_layout(d, true); });
+    auto groups =
+        auto_layouts_.groups(shaders, [&](const BindGroupLayoutDesc& d) { return make_group_layout(d, true); });
     if (!groups) return Error{formatted("pipeline '{}': {}", out.label, groups.error().message), groups.error().kind};
     Result<VkPipelineLayout> vk = make_layout(*groups, out.reflection.push_bytes);
     if (!vk) return Error{formatted("pipeline '{}': {}", out.label, vk.error().message), vk.error().kind};
@@ -191,7 +201,12 @@ Result<ComputePipeline> VulkanDevice::create_compute_pipeline(const ComputePipel
     if (!shader) return Error{formatted("pipeline '{}': stale shader module", desc.label)};
     if (shader->reflection.stage != ShaderStage::Compute)
         return Error{formatted("pipeline '{}': '{}' is not a compute shader", desc.label, shader->label)};
-    Pipeline p{.label = std::string(desc.label), .reflection = shader->reflection, .groups = {}, .vk = {}, .layout = {}, .owns_layout = false};
+    Pipeline p{.label = std::string(desc.label),
+               .reflection = shader->reflection,
+               .groups = {},
+               .vk = {},
+               .layout = {},
+               .owns_layout = false};
     const Reflection* const reflections[] = {&shader->reflection};
     if (Result<void> r = choose_layout(p, desc.layout, reflections); !r) return r.error();
 
@@ -219,10 +234,17 @@ Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipeline
     if (!draws()) return Error{formatted("pipeline '{}': the device's queue doesn't draw", desc.label)};
     const Shader* vertex = found(shaders_.get(desc.vertex), "shader module");
     const Shader* fragment = desc.fragment ? found(shaders_.get(desc.fragment), "shader module") : nullptr;
-    if (!vertex || (desc.fragment && !fragment)) return Error{formatted("pipeline '{}': stale shader module", desc.label)};
-    if (desc.colors.size() > kMaxColorTargets) return Error{formatted("pipeline '{}': too many colour targets", desc.label)};
+    if (!vertex || (desc.fragment && !fragment))
+        return Error{formatted("pipeline '{}': stale shader module", desc.label)};
+    if (desc.colors.size() > kMaxColorTargets)
+        return Error{formatted("pipeline '{}': too many colour targets", desc.label)};
 
-    Pipeline p{.label = std::string(desc.label), .reflection = vertex->reflection, .groups = {}, .vk = {}, .layout = {}, .owns_layout = false};
+    Pipeline p{.label = std::string(desc.label),
+               .reflection = vertex->reflection,
+               .groups = {},
+               .vk = {},
+               .layout = {},
+               .owns_layout = false};
     std::vector<const Reflection*> reflections{&vertex->reflection};
     if (fragment) {
         reflections.push_back(&fragment->reflection);
@@ -249,16 +271,18 @@ Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipeline
     std::vector<VkVertexInputAttributeDescription> attributes;
     for (const VertexBufferLayout& b : desc.vertex_buffers) {
         const uint32_t slot = uint32_t(bindings.size());
-        bindings.push_back({slot, b.stride, b.per_instance ? VK_VERTEX_INPUT_RATE_INSTANCE : VK_VERTEX_INPUT_RATE_VERTEX});
-        for (const VertexAttribute& a : b.attributes) attributes.push_back({a.location, slot, to_vk(a.format), a.offset});
+        bindings.push_back(
+            {slot, b.stride, b.per_instance ? VK_VERTEX_INPUT_RATE_INSTANCE : VK_VERTEX_INPUT_RATE_VERTEX});
+        for (const VertexAttribute& a : b.attributes)
+            attributes.push_back({a.location, slot, to_vk(a.format), a.offset});
     }
     const VkPipelineVertexInputStateCreateInfo input{.sType = VK_STRUCTURE_TYPE_PIPELINE_VERTEX_INPUT_STATE_CREATE_INFO,
                                                      .vertexBindingDescriptionCount = uint32_t(bindings.size()),
                                                      .pVertexBindingDescriptions = bindings.data(),
                                                      .vertexAttributeDescriptionCount = uint32_t(attributes.size()),
                                                      .pVertexAttributeDescriptions = attributes.data()};
-    const VkPipelineInputAssemblyStateCreateInfo assembly{.sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO,
-                                                          .topology = to_vk(desc.topology)};
+    const VkPipelineInputAssemblyStateCreateInfo assembly{
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_INPUT_ASSEMBLY_STATE_CREATE_INFO, .topology = to_vk(desc.topology)};
     const VkPipelineViewportStateCreateInfo viewport{
         .sType = VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO, .viewportCount = 1, .scissorCount = 1};
     const VkPipelineRasterizationStateCreateInfo raster{
@@ -270,12 +294,14 @@ Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipeline
         // The viewport turns the picture over and, with it, the way round; both together leave it as the user means it.
         .frontFace = desc.front_is_counter_clockwise ? VK_FRONT_FACE_COUNTER_CLOCKWISE : VK_FRONT_FACE_CLOCKWISE,
         .lineWidth = 1.0f};
-    const VkPipelineMultisampleStateCreateInfo samples{.sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
-                                                       .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT};
-    const VkPipelineDepthStencilStateCreateInfo depth{.sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
-                                                      .depthTestEnable = desc.depth.format != Format::Undefined,
-                                                      .depthWriteEnable = desc.depth.write,
-                                                      .depthCompareOp = to_vk(desc.depth.compare)};
+    const VkPipelineMultisampleStateCreateInfo samples{
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_MULTISAMPLE_STATE_CREATE_INFO,
+        .rasterizationSamples = VK_SAMPLE_COUNT_1_BIT};
+    const VkPipelineDepthStencilStateCreateInfo depth{
+        .sType = VK_STRUCTURE_TYPE_PIPELINE_DEPTH_STENCIL_STATE_CREATE_INFO,
+        .depthTestEnable = desc.depth.format != Format::Undefined,
+        .depthWriteEnable = desc.depth.write,
+        .depthCompareOp = to_vk(desc.depth.compare)};
     std::vector<VkPipelineColorBlendAttachmentState> blends;
     std::vector<VkFormat> formats;
     for (const ColorTarget& c : desc.colors) {
@@ -292,7 +318,8 @@ Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipeline
     const VkPipelineColorBlendStateCreateInfo blend{.sType = VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO,
                                                     .attachmentCount = uint32_t(blends.size()),
                                                     .pAttachments = blends.data()};
-    const VkDynamicState dynamics[] = {VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR, VK_DYNAMIC_STATE_BLEND_CONSTANTS};
+    const VkDynamicState dynamics[] = {VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR,
+                                       VK_DYNAMIC_STATE_BLEND_CONSTANTS};
     const VkPipelineDynamicStateCreateInfo dynamic{.sType = VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO,
                                                    .dynamicStateCount = uint32_t(std::size(dynamics)),
                                                    .pDynamicStates = dynamics};

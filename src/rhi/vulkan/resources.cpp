@@ -12,11 +12,14 @@ std::string quoted(std::string_view kind, std::string_view label) { return forma
 
 VkImageViewType view_type(const TextureDesc& texture, const ViewDesc& view) {
     switch (texture.dimension) {
-        case Dimension::D1: return VK_IMAGE_VIEW_TYPE_1D;
-        case Dimension::D3: return VK_IMAGE_VIEW_TYPE_3D;
-        case Dimension::D2: return VK_IMAGE_VIEW_TYPE_2D;
-        case Dimension::D2Array:
-            return view.range.layer_count > 1 || view.as_array ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : VK_IMAGE_VIEW_TYPE_2D;
+    case Dimension::D1:
+        return VK_IMAGE_VIEW_TYPE_1D;
+    case Dimension::D3:
+        return VK_IMAGE_VIEW_TYPE_3D;
+    case Dimension::D2:
+        return VK_IMAGE_VIEW_TYPE_2D;
+    case Dimension::D2Array:
+        return view.range.layer_count > 1 || view.as_array ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : VK_IMAGE_VIEW_TYPE_2D;
     }
     return VK_IMAGE_VIEW_TYPE_2D;
 }
@@ -25,15 +28,20 @@ VkBufferCreateInfo buffer_info(const BufferDesc& desc) {
     return {.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO,
             .size = desc.size,
             // write_buffer may fill any buffer of device memory.
-            .usage = to_vk(desc.usage) | VkBufferUsageFlags(desc.memory == MemoryKind::Device ? VK_BUFFER_USAGE_TRANSFER_DST_BIT : 0)};
+            .usage = to_vk(desc.usage) |
+                     VkBufferUsageFlags(desc.memory == MemoryKind::Device ? VK_BUFFER_USAGE_TRANSFER_DST_BIT : 0)};
 }
 
 }  // namespace
 
 Result<HeapHandle> VulkanDevice::create_heap(const HeapDesc& desc) {
-    VkMemoryRequirements need{.size = desc.size, .alignment = std::max<uint64_t>(memory_.granularity(), 64 << 10), .memoryTypeBits = 0};
+    // Whole granules: what the heap holds never shares one with the images around it.
+    const uint64_t granule = std::max<uint64_t>(memory_.granularity(), 64 << 10);
+    VkMemoryRequirements need{
+        .size = (desc.size + granule - 1) / granule * granule, .alignment = granule, .memoryTypeBits = 0};
     // Types that a plain buffer and a plain image both take; measured on small ones.
-    Result<VkBuffer> buffer = make_buffer({.size = 1024, .usage = BufferUsage::Storage | BufferUsage::CopySrc | BufferUsage::CopyDst});
+    Result<VkBuffer> buffer =
+        make_buffer({.size = 1024, .usage = BufferUsage::Storage | BufferUsage::CopySrc | BufferUsage::CopyDst});
     if (!buffer) return buffer.error();
     VkMemoryRequirements of_buffer;
     vk_.vkGetBufferMemoryRequirements(device_, *buffer, &of_buffer);
@@ -63,7 +71,8 @@ Result<VkBuffer> VulkanDevice::make_buffer(const BufferDesc& desc) {
 Result<BufferHandle> VulkanDevice::create_buffer(const BufferDesc& desc) {
     if (desc.size == 0) return Error{quoted("buffer", desc.label) + ": size 0"};
     if (desc.size > limits_.max_buffer)
-        return Error{formatted("buffer '{}': {} B, the device allows {}", desc.label, desc.size, limits_.max_buffer), ErrorKind::OutOfMemory};
+        return Error{formatted("buffer '{}': {} B, the device allows {}", desc.label, desc.size, limits_.max_buffer),
+                     ErrorKind::OutOfMemory};
     Result<VkBuffer> vk = make_buffer(desc);
     if (!vk) return vk.error();
     Buffer b{std::string(desc.label), desc, *vk, {}};
@@ -101,7 +110,9 @@ Result<BufferHandle> VulkanDevice::create_buffer(const BufferDesc& desc) {
 VkImageCreateInfo VulkanDevice::image_info(const TextureDesc& desc) const {
     const bool volume = desc.dimension == Dimension::D3;
     return {.sType = VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO,
-            .imageType = desc.dimension == Dimension::D1 ? VK_IMAGE_TYPE_1D : volume ? VK_IMAGE_TYPE_3D : VK_IMAGE_TYPE_2D,
+            .imageType = desc.dimension == Dimension::D1 ? VK_IMAGE_TYPE_1D
+                         : volume                        ? VK_IMAGE_TYPE_3D
+                                                         : VK_IMAGE_TYPE_2D,
             .format = to_vk(desc.format),
             .extent = {desc.size.width, desc.size.height, volume ? desc.size.depth : 1},
             .mipLevels = desc.mips,
@@ -116,16 +127,19 @@ Result<TextureHandle> VulkanDevice::create_texture(const TextureDesc& desc) {
     const std::string what = quoted("texture", desc.label);
     const VkImageCreateInfo info = image_info(desc);
     VkImageFormatProperties can{};
-    VkResult r = vkGetPhysicalDeviceImageFormatProperties(adapter_.physical, info.format, info.imageType, info.tiling, info.usage, 0, &can);
+    VkResult r = vkGetPhysicalDeviceImageFormatProperties(adapter_.physical, info.format, info.imageType, info.tiling,
+                                                          info.usage, 0, &can);
     if (r != VK_SUCCESS) return fail(formatted("texture '{}' of {}", desc.label, name(desc.format)), r);
     // Some drivers report more for volumes here than they can do.
     const uint32_t most = desc.dimension == Dimension::D3 ? limits_.max_texture_3d : limits_.max_texture_2d;
     const uint32_t largest = std::max({info.extent.width, info.extent.height, info.extent.depth});
-    if (largest == 0 || std::min({info.extent.width, info.extent.height, info.extent.depth, info.arrayLayers, desc.mips}) == 0 ||
+    if (largest == 0 ||
+        std::min({info.extent.width, info.extent.height, info.extent.depth, info.arrayLayers, desc.mips}) == 0 ||
         largest > most || info.extent.width > can.maxExtent.width || info.extent.height > can.maxExtent.height ||
-        info.extent.depth > can.maxExtent.depth || info.arrayLayers > can.maxArrayLayers || desc.mips > full_mip_count(desc))
-        return Error{formatted("texture '{}': {}x{}x{} with {} mips is not possible here (at most {} along an edge)", desc.label,
-                               desc.size.width, desc.size.height, desc.size.depth, desc.mips, most)};
+        info.extent.depth > can.maxExtent.depth || info.arrayLayers > can.maxArrayLayers ||
+        desc.mips > full_mip_count(desc))
+        return Error{formatted("texture '{}': {}x{}x{} with {} mips is not possible here (at most {} along an edge)",
+                               desc.label, desc.size.width, desc.size.height, desc.size.depth, desc.mips, most)};
 
     VkImage vk = VK_NULL_HANDLE;
     if (r = vk_.vkCreateImage(device_, &info, nullptr, &vk); r != VK_SUCCESS) return fail(what, r);
@@ -161,7 +175,8 @@ Result<TextureHandle> VulkanDevice::create_texture(const TextureDesc& desc) {
     const TextureHandle handle = textures_.insert(std::move(t));
     Texture& made = *textures_.get(handle);
     // An image that is only copied can't be looked at.
-    constexpr TextureUsage kViewable = TextureUsage::Sampled | TextureUsage::Storage | TextureUsage::Color | TextureUsage::Depth;
+    constexpr TextureUsage kViewable =
+        TextureUsage::Sampled | TextureUsage::Storage | TextureUsage::Color | TextureUsage::Depth;
     if (any(desc.usage & kViewable)) {
         const ViewDesc view{.texture = handle, .range = resolved(desc, {}), .as_array = true};
         Result<VkImageView> whole = make_view(made, view);
@@ -177,12 +192,13 @@ Result<TextureHandle> VulkanDevice::create_texture(const TextureDesc& desc) {
 }
 
 Result<VkImageView> VulkanDevice::make_view(const Texture& texture, const ViewDesc& desc) {
-    const VkImageViewCreateInfo info{.sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
-                                     .image = texture.vk,
-                                     .viewType = view_type(texture.desc, desc),
-                                     .format = to_vk(texture.desc.format),
-                                     .subresourceRange = {aspect(texture.desc.format), desc.range.base_mip, desc.range.mip_count,
-                                                          desc.range.base_layer, desc.range.layer_count}};
+    const VkImageViewCreateInfo info{
+        .sType = VK_STRUCTURE_TYPE_IMAGE_VIEW_CREATE_INFO,
+        .image = texture.vk,
+        .viewType = view_type(texture.desc, desc),
+        .format = to_vk(texture.desc.format),
+        .subresourceRange = {aspect(texture.desc.format), desc.range.base_mip, desc.range.mip_count,
+                             desc.range.base_layer, desc.range.layer_count}};
     VkImageView out = VK_NULL_HANDLE;
     if (const VkResult r = vk_.vkCreateImageView(device_, &info, nullptr, &out); r != VK_SUCCESS)
         return fail(quoted("view of texture", texture.label), r);
@@ -207,9 +223,10 @@ Result<ViewHandle> VulkanDevice::create_view(const ViewDesc& desc) {
 
 Result<SamplerHandle> VulkanDevice::create_sampler(const SamplerDesc& desc) {
     const auto filter = [](Filter f) { return f == Filter::Linear ? VK_FILTER_LINEAR : VK_FILTER_NEAREST; };
-    const VkSamplerAddressMode address = desc.address == AddressMode::Repeat         ? VK_SAMPLER_ADDRESS_MODE_REPEAT
-                                         : desc.address == AddressMode::MirrorRepeat ? VK_SAMPLER_ADDRESS_MODE_MIRRORED_REPEAT
-                                                                                     : VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
+    const VkSamplerAddressMode address = desc.address == AddressMode::Repeat ? VK_SAMPLER_ADDRESS_MODE_REPEAT
+                                         : desc.address == AddressMode::MirrorRepeat
+                                             ? VK_SAMPLER_ADDRESS_MODE_MIRRORED_REPEAT
+                                             : VK_SAMPLER_ADDRESS_MODE_CLAMP_TO_EDGE;
     const VkSamplerCreateInfo info{
         .sType = VK_STRUCTURE_TYPE_SAMPLER_CREATE_INFO,
         .magFilter = filter(desc.mag),
@@ -286,7 +303,8 @@ ViewDesc VulkanDevice::desc(ViewHandle view) {
 // ---- the end of them
 
 void VulkanDevice::destroy(HeapHandle handle) {
-    if (auto h = take(heaps_, handle, "heap")) retire(VK_OBJECT_TYPE_DEVICE_MEMORY, VkDeviceMemory(VK_NULL_HANDLE), h->memory);
+    if (auto h = take(heaps_, handle, "heap"))
+        retire(VK_OBJECT_TYPE_DEVICE_MEMORY, VkDeviceMemory(VK_NULL_HANDLE), h->memory);
 }
 
 void VulkanDevice::destroy(BufferHandle handle) {
@@ -302,7 +320,8 @@ void VulkanDevice::destroy(TextureHandle handle) {
 }
 
 void VulkanDevice::destroy(ViewHandle handle) {
-    if (const View* v = views_.get(handle); v && v->whole) return report_("destroy: '" + v->label + "' is the view that its texture owns");
+    if (const View* v = views_.get(handle); v && v->whole)
+        return report_("destroy: '" + v->label + "' is the view that its texture owns");
     if (auto v = take(views_, handle, "view")) retire(VK_OBJECT_TYPE_IMAGE_VIEW, v->vk);
 }
 
@@ -316,22 +335,37 @@ void VulkanDevice::destroy(QuerySet handle) {
 
 void VulkanDevice::destroy_now(const Garbage& g) {
     switch (g.type) {
-        case VK_OBJECT_TYPE_BUFFER: vk_.vkDestroyBuffer(device_, VkBuffer(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_IMAGE: vk_.vkDestroyImage(device_, VkImage(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_IMAGE_VIEW: vk_.vkDestroyImageView(device_, VkImageView(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_SAMPLER: vk_.vkDestroySampler(device_, VkSampler(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_PIPELINE: vk_.vkDestroyPipeline(device_, VkPipeline(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_PIPELINE_LAYOUT: vk_.vkDestroyPipelineLayout(device_, VkPipelineLayout(g.object), nullptr); break;
-        case VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT:
-            vk_.vkDestroyDescriptorSetLayout(device_, VkDescriptorSetLayout(g.object), nullptr);
-            break;
-        case VK_OBJECT_TYPE_DESCRIPTOR_SET: {
-            const VkDescriptorSet set = VkDescriptorSet(g.object);
-            vk_.vkFreeDescriptorSets(device_, g.pool, 1, &set);
-            break;
-        }
-        case VK_OBJECT_TYPE_QUERY_POOL: vk_.vkDestroyQueryPool(device_, VkQueryPool(g.object), nullptr); break;
-        default: break;  // memory alone
+    case VK_OBJECT_TYPE_BUFFER:
+        vk_.vkDestroyBuffer(device_, VkBuffer(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_IMAGE:
+        vk_.vkDestroyImage(device_, VkImage(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_IMAGE_VIEW:
+        vk_.vkDestroyImageView(device_, VkImageView(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_SAMPLER:
+        vk_.vkDestroySampler(device_, VkSampler(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_PIPELINE:
+        vk_.vkDestroyPipeline(device_, VkPipeline(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_PIPELINE_LAYOUT:
+        vk_.vkDestroyPipelineLayout(device_, VkPipelineLayout(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_DESCRIPTOR_SET_LAYOUT:
+        vk_.vkDestroyDescriptorSetLayout(device_, VkDescriptorSetLayout(g.object), nullptr);
+        break;
+    case VK_OBJECT_TYPE_DESCRIPTOR_SET: {
+        const VkDescriptorSet set = VkDescriptorSet(g.object);
+        vk_.vkFreeDescriptorSets(device_, g.pool, 1, &set);
+        break;
+    }
+    case VK_OBJECT_TYPE_QUERY_POOL:
+        vk_.vkDestroyQueryPool(device_, VkQueryPool(g.object), nullptr);
+        break;
+    default:
+        break;  // memory alone
     }
     memory_.release(g.memory);
 }

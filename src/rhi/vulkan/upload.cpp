@@ -43,7 +43,8 @@ Result<Uploads::Chunk> Uploads::make_chunk(uint64_t size) {
     const VkBufferCreateInfo info{
         .sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = size, .usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT};
     Chunk out;
-    if (const VkResult r = vk_->vkCreateBuffer(device_, &info, nullptr, &out.buffer); r != VK_SUCCESS) return failure("staging", r);
+    if (const VkResult r = vk_->vkCreateBuffer(device_, &info, nullptr, &out.buffer); r != VK_SUCCESS)
+        return failure("staging", r);
     VkMemoryRequirements need;
     vk_->vkGetBufferMemoryRequirements(device_, out.buffer, &need);
     Result<Allocation> memory = memory_->allocate(need, MemoryKind::Upload, false, "staging");
@@ -52,7 +53,8 @@ Result<Uploads::Chunk> Uploads::make_chunk(uint64_t size) {
         return memory.error();
     }
     out.memory = *memory;
-    if (const VkResult r = vk_->vkBindBufferMemory(device_, out.buffer, memory->memory, memory->offset); r != VK_SUCCESS) {
+    if (const VkResult r = vk_->vkBindBufferMemory(device_, out.buffer, memory->memory, memory->offset);
+        r != VK_SUCCESS) {
         free_chunk(out);
         return failure("staging", r);
     }
@@ -82,7 +84,8 @@ Result<void> Uploads::to_buffer(VkBuffer buffer, uint64_t offset, std::span<cons
     if (bytes.empty()) return {};
     Result<Place> place = stage(bytes, 16);
     if (!place) return place.error();
-    buffers_.push_back({place->buffer, buffer,
+    buffers_.push_back({place->buffer,
+                        buffer,
                         {.sType = VK_STRUCTURE_TYPE_BUFFER_COPY_2,
                          .srcOffset = place->offset,
                          .dstOffset = offset,
@@ -113,10 +116,11 @@ void Uploads::record(VkCommandBuffer commands, SubmitId id) {
     size_t since = 0;
     for (size_t i = 0; i < buffers_.size(); ++i) {
         const BufferCopy& copy = buffers_[i];
-        const bool overlaps = std::any_of(buffers_.begin() + ptrdiff_t(since), buffers_.begin() + ptrdiff_t(i), [&](const BufferCopy& c) {
-            return c.to == copy.to && c.region.dstOffset < copy.region.dstOffset + copy.region.size &&
-                   copy.region.dstOffset < c.region.dstOffset + c.region.size;
-        });
+        const bool overlaps =
+            std::any_of(buffers_.begin() + ptrdiff_t(since), buffers_.begin() + ptrdiff_t(i), [&](const BufferCopy& c) {
+                return c.to == copy.to && c.region.dstOffset < copy.region.dstOffset + copy.region.size &&
+                       copy.region.dstOffset < c.region.dstOffset + c.region.size;
+            });
         if (overlaps || i - since >= kWindow) {
             full_barrier(*vk_, commands,
                          {.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
@@ -137,17 +141,18 @@ void Uploads::record(VkCommandBuffer commands, SubmitId id) {
     for (const ImageCopy& copy : images_) {
         const ImageTarget& t = copy.target;
         const VkImageSubresourceLayers& s = t.region.imageSubresource;
-        VkImageMemoryBarrier2 barrier{.sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
-                                      .srcStageMask = t.before.stages | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
-                                      .srcAccessMask = t.before.access | VK_ACCESS_2_TRANSFER_WRITE_BIT,
-                                      .dstStageMask = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
-                                      .dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT,
-                                      .oldLayout = t.layout_before,
-                                      .newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
-                                      .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                      .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
-                                      .image = t.image,
-                                      .subresourceRange = {s.aspectMask, s.mipLevel, 1, s.baseArrayLayer, s.layerCount}};
+        VkImageMemoryBarrier2 barrier{
+            .sType = VK_STRUCTURE_TYPE_IMAGE_MEMORY_BARRIER_2,
+            .srcStageMask = t.before.stages | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
+            .srcAccessMask = t.before.access | VK_ACCESS_2_TRANSFER_WRITE_BIT,
+            .dstStageMask = VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
+            .dstAccessMask = VK_ACCESS_2_TRANSFER_WRITE_BIT,
+            .oldLayout = t.layout_before,
+            .newLayout = VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL,
+            .srcQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+            .dstQueueFamilyIndex = VK_QUEUE_FAMILY_IGNORED,
+            .image = t.image,
+            .subresourceRange = {s.aspectMask, s.mipLevel, 1, s.baseArrayLayer, s.layerCount}};
         const VkDependencyInfo dependency{
             .sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO, .imageMemoryBarrierCount = 1, .pImageMemoryBarriers = &barrier};
         vk_->vkCmdPipelineBarrier2(commands, &dependency);
