@@ -16,7 +16,8 @@ namespace {
 constexpr float kLightHeight = 5, kLightRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
 
 float box_distance(vec3 p, vec3 lo, vec3 hi) {
-    const vec3 q{std::fabs(p.x - 0.5f * (lo.x + hi.x)) - 0.5f * (hi.x - lo.x), std::fabs(p.y - 0.5f * (lo.y + hi.y)) - 0.5f * (hi.y - lo.y),
+    const vec3 q{std::fabs(p.x - 0.5f * (lo.x + hi.x)) - 0.5f * (hi.x - lo.x),
+                 std::fabs(p.y - 0.5f * (lo.y + hi.y)) - 0.5f * (hi.y - lo.y),
                  std::fabs(p.z - 0.5f * (lo.z + hi.z)) - 0.5f * (hi.z - lo.z)};
     return length(max(q, vec3{0, 0, 0})) + std::min(std::max(q.x, std::max(q.y, q.z)), 0.0f);
 }
@@ -32,7 +33,8 @@ auto leaning_block(float h) {
         const float x = p.x, y = p.y - h;
         const float bottom = x < 0 ? std::fabs(y) : std::hypot(x, y);
         const float along = std::max(0.0f, (y - x) * std::numbers::sqrt2_v<float> / 2);  // on the side, from the edge
-        const float side = std::hypot(x + along * std::numbers::sqrt2_v<float> / 2, y - along * std::numbers::sqrt2_v<float> / 2);
+        const float side =
+            std::hypot(x + along * std::numbers::sqrt2_v<float> / 2, y - along * std::numbers::sqrt2_v<float> / 2);
         const float d = std::min(bottom, side);
         return std::min(p.y, y > 0 && x + y < 0 ? -d : d);
     };
@@ -44,7 +46,8 @@ float visible_from(const Field& field, float x) {
     const vec3 to_light{-x, kLightHeight, 0};
     const float distance = length(to_light);
     SoftShadow shadow{field};
-    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance, {1e-3f, distance, 1e-4f, 256});
+    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance,
+                                 {1e-3f, distance, 1e-4f, 256});
 }
 
 // Where along x the fraction is f.
@@ -68,7 +71,8 @@ TEST(SoftShadow, HalfPlaneHidesItsShareOfTheDisc) {
         for (const float h : {0.5f, 1.0f, 2.5f}) {
             // The ray to the light's centre passes the edge's height at x (1 - h/D); a disc radius is R h / D there.
             const float x = float(offset) * kLightRadius * h / (kLightHeight - h);
-            EXPECT_NEAR(visible_from(leaning_block(h), x), visible, 0.02) << "block, edge at " << offset << ", height " << h;
+            EXPECT_NEAR(visible_from(leaning_block(h), x), visible, 0.02)
+                << "block, edge at " << offset << ", height " << h;
             for (const float thickness : {0.02f, 0.005f}) {
                 EXPECT_NEAR(visible_from(half_plane(h, thickness), x), visible, 0.02)
                     << "plate of " << thickness << " m, edge at " << offset << ", height " << h;
@@ -97,9 +101,12 @@ TEST(SoftShadow, ThinWallsHideEverythingBehindThem) {
         for (const float tilt_deg : {0.0f, 20.0f, 45.0f, 70.0f}) {
             const float a = tilt_deg * std::numbers::pi_v<float> / 180;
             const vec3 n{std::sin(a), std::cos(a), 0};
-            const auto wall = [=](vec3 p) { return std::min(p.y, std::fabs(dot(n, p - vec3{0, 2, 0})) - 0.5f * thickness); };
+            const auto wall = [=](vec3 p) {
+                return std::min(p.y, std::fabs(dot(n, p - vec3{0, 2, 0})) - 0.5f * thickness);
+            };
             for (float x = -0.4f; x <= 0.4f; x += 0.037f) {
-                EXPECT_LE(visible_from(wall, x), 0.01f) << thickness << " m thick, tilted by " << tilt_deg << ", at " << x;
+                EXPECT_LE(visible_from(wall, x), 0.01f)
+                    << thickness << " m thick, tilted by " << tilt_deg << ", at " << x;
             }
         }
     }
@@ -112,7 +119,8 @@ TEST(SoftShadow, UnoccludedPlaneDoesNotShadowItself) {
         for (const float tan_radius : {0.0f, 0.0046f, 0.0087f}) {
             const float offset = 0.01f;  // the start is one voxel off the surface
             SoftShadow shadow{plane};
-            const float seen = shadow.shadow_visible({0, offset, 0}, {std::sin(a), std::cos(a), 0}, tan_radius, {offset, 100, 1e-4f, 256});
+            const float seen = shadow.shadow_visible({0, offset, 0}, {std::sin(a), std::cos(a), 0}, tan_radius,
+                                                     {offset, 100, 1e-4f, 256});
             EXPECT_GE(seen, 0.99f) << degrees << " degrees, disc " << tan_radius;
         }
     }
@@ -125,7 +133,8 @@ TEST(SoftShadow, HardShadowEndsAtTheProjectedEdge) {
         if (std::fabs(x) < 0.004f) continue;
         const vec3 to_light{-x, kLightHeight, 0};
         SoftShadow shadow{field};
-        const float seen = shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, 256});
+        const float seen =
+            shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, 256});
         EXPECT_EQ(seen, x > 0 ? 1.0f : 0.0f) << x;
     }
 }
@@ -145,11 +154,14 @@ TEST(SoftShadow, VisibilityGrowsTowardsTheLight) {
 // A strip hides what is between its edges: seen from below, 0.04 m at height 2 are +-0.05 radii of the disc.
 TEST(SoftShadow, AWireHidesAStrip) {
     const float h = 2, half_width = 0.02f;
-    const auto wire = [=](vec3 p) { return std::min(p.y, box_distance(p, {-half_width, h, -100}, {half_width, h + 0.002f, 100})); };
+    const auto wire = [=](vec3 p) {
+        return std::min(p.y, box_distance(p, {-half_width, h, -100}, {half_width, h + 0.002f, 100}));
+    };
     SoftShadow shadow{wire};
     for (float x = -0.5f; x <= 0.5f; x += 0.01f) {
         const float middle = x * (1 - h / kLightHeight), cone = kLightRadius * h / kLightHeight;
-        const double hidden = shadow.disc_visible((middle + half_width) / cone) - shadow.disc_visible((middle - half_width) / cone);
+        const double hidden =
+            shadow.disc_visible((middle + half_width) / cone) - shadow.disc_visible((middle - half_width) / cone);
         EXPECT_NEAR(visible_from(wire, x), 1 - hidden, 0.02) << x;
     }
 }
@@ -157,7 +169,8 @@ TEST(SoftShadow, AWireHidesAStrip) {
 TEST(SoftShadow, PartsOfADiscMakeUpTheDisc) {
     // A corner: neither straight edge alone. Two quarter planes at height 2 leave a quarter of the disc.
     const auto corner = [](vec3 p) {
-        return std::min({p.y, box_distance(p, {-100, 2, -100}, {0, 2.002f, 100}), box_distance(p, {-100, 2, -100}, {100, 2.002f, 0})});
+        return std::min({p.y, box_distance(p, {-100, 2, -100}, {0, 2.002f, 100}),
+                         box_distance(p, {-100, 2, -100}, {100, 2.002f, 0})});
     };
     const int parts = 64;
     float seen = 0;

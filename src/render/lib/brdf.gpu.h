@@ -28,21 +28,22 @@ KILN_CONST float kMinRoughness = 0.045f;
 // Reflectance of a dielectric along its normal (refractive index 1.5).
 KILN_CONST float kDielectricF0 = 0.04f;
 
-// What light sees of a surface.
+// What light sees of a surface: glTF 2.0 metallic-roughness, a mix of a metal and of a Lambert base under a clear dielectric.
 struct SurfaceOptics {
-    vec3 base;        // albedo of the Lambert base, [0, 1]
-    vec3 f0;          // reflectance along the normal, [0, 1]
-    float f90;        // reflectance at grazing angles: 1; 0 with f0 = 0 is a bare Lambert surface
-    float roughness;  // perceptual, [kMinRoughness, 1]; alpha = roughness²
+    vec3 base_color;      // [0, 1]: reflectance of the metal along its normal, albedo of the base
+    float metallic;       // [0, 1]
+    float roughness;      // perceptual, [kMinRoughness, 1]; alpha = roughness²
+    float dielectric_f0;  // kDielectricF0; 0 with f90 = 0 is a bare Lambert surface
+    float f90;            // reflectance at grazing angles: 1
 };
 
-// glTF 2.0 metallic-roughness.
 KILN_FN SurfaceOptics surface_optics(vec3 base_color, float metallic, float roughness) {
     SurfaceOptics s;
-    s.base = base_color * (1.0f - metallic);
-    s.f0 = mix(splat3(kDielectricF0), base_color, metallic);
-    s.f90 = 1.0f;
+    s.base_color = base_color;
+    s.metallic = saturate(metallic);
     s.roughness = clamp(roughness, kMinRoughness, 1.0f);
+    s.dielectric_f0 = kDielectricF0;
+    s.f90 = 1.0f;
     return s;
 }
 
@@ -83,7 +84,8 @@ KILN_FN vec2 ggx_directional_albedo(float roughness, float n_v) {
     uint w11 = ggx_table_word(at + uint(kGgxTableSide) + 1u);
     float s = column - column_0;
     float t = row - row_0;
-    float x = mix(mix(float(w00 & 0xffffu), float(w01 & 0xffffu), s), mix(float(w10 & 0xffffu), float(w11 & 0xffffu), s), t);
+    float x =
+        mix(mix(float(w00 & 0xffffu), float(w01 & 0xffffu), s), mix(float(w10 & 0xffffu), float(w11 & 0xffffu), s), t);
     float y = mix(mix(float(w00 >> 16u), float(w01 >> 16u), s), mix(float(w10 >> 16u), float(w11 >> 16u), s), t);
     return vec2(x / 65535.0f, y / 65535.0f);
 }
@@ -106,18 +108,20 @@ struct SurfaceView {
     SurfaceOptics optics;
     vec3 n;
     vec3 v;
-    float n_v;           // > 0
+    float n_v;  // > 0
     float alpha;
-    vec3 gain;           // what the reflection is multiplied by, so that nothing is lost between microfacets
-    vec3 reflected;      // share of a constant sky that the reflection sends to v
-    vec3 base_in;        // base / pi, times the share that leaves towards v, over the mean share
-    vec3 base_ambient;   // base, times the share that leaves towards v
+    vec3 f0;
+    vec3 gain;          // what single scattering is multiplied by, so that nothing is lost between microfacets
+    vec3 reflected;     // share of a constant sky that the reflection sends to v
+    vec3 base_in;       // base / pi, times the share that leaves towards v, over the mean share
+    vec3 base_ambient;  // base, times the share that leaves towards v
 };
 
-KILN_FN vec3 reflected_share(vec3 f0, float f90, vec3 gain, vec2 albedo) {
-    vec3 e = vec3((f0.x * albedo.x + f90 * albedo.y) * gain.x, (f0.y * albedo.x + f90 * albedo.y) * gain.y,
-                  (f0.z * albedo.x + f90 * albedo.y) * gain.z);
-    return vec3(min(e.x, 1.0f), min(e.y, 1.0f), min(e.z, 1.0f));
+// Share of a constant sky that a surface of reflectance f0 reflects. What single scattering loses, 1/E - 1 of what it
+// keeps, bounces on between microfacets and meets f0 once more.
+KILN_FN float reflected_share(float f0, float f90, vec2 albedo) {
+    float lost = 1.0f / max(albedo.x + albedo.y, 1e-3f) - 1.0f;
+    return min((f0 * albedo.x + f90 * albedo.y) * (1.0f + f0 * lost), 1.0f);
 }
 
 KILN_FN SurfaceView surface_view(SurfaceOptics optics, vec3 n, vec3 v) {
@@ -128,17 +132,18 @@ KILN_FN SurfaceView surface_view(SurfaceOptics optics, vec3 n, vec3 v) {
     s.n_v = max(abs(dot(n, v)), 1e-4f);
     s.alpha = optics.roughness * optics.roughness;
     vec2 albedo = ggx_directional_albedo(optics.roughness, s.n_v);
-    vec2 average = ggx_average_albedo(optics.roughness);
-    // What a mirror of f0 = 1 would keep; the lost rest bounces on and meets f0 again.
-    float lost = 1.0f / max(albedo.x + albedo.y, 1e-3f) - 1.0f;
-    s.gain = splat3(1.0f) + optics.f0 * lost;
-    float lost_average = 1.0f / max(average.x + average.y, 1e-3f) - 1.0f;
-    s.reflected = reflected_share(optics.f0, optics.f90, s.gain, albedo);
-    vec3 mean = reflected_share(optics.f0, optics.f90, splat3(1.0f) + optics.f0 * lost_average, average);
-    vec3 passed = splat3(1.0f) - s.reflected;
-    s.base_ambient = optics.base * passed;
-    s.base_in = vec3(s.base_ambient.x / (kPi * max(1.0f - mean.x, 1e-3f)), s.base_ambient.y / (kPi * max(1.0f - mean.y, 1e-3f)),
-                     s.base_ambient.z / (kPi * max(1.0f - mean.z, 1e-3f)));
+    s.f0 = mix(splat3(optics.dielectric_f0), optics.base_color, optics.metallic);
+    float clear = reflected_share(optics.dielectric_f0, optics.f90, albedo);
+    vec3 metal = vec3(reflected_share(optics.base_color.x, optics.f90, albedo),
+                      reflected_share(optics.base_color.y, optics.f90, albedo),
+                      reflected_share(optics.base_color.z, optics.f90, albedo));
+    s.reflected = mix(splat3(clear), metal, optics.metallic);
+    vec3 single = s.f0 * albedo.x + splat3(optics.f90 * albedo.y);
+    s.gain = vec3(s.reflected.x / max(single.x, 1e-6f), s.reflected.y / max(single.y, 1e-6f),
+                  s.reflected.z / max(single.z, 1e-6f));
+    float mean = reflected_share(optics.dielectric_f0, optics.f90, ggx_average_albedo(optics.roughness));
+    s.base_ambient = optics.base_color * ((1.0f - optics.metallic) * (1.0f - clear));
+    s.base_in = s.base_ambient * (1.0f / (kPi * (1.0f - mean)));
     return s;
 }
 
@@ -153,11 +158,9 @@ KILN_FN vec3 brdf_times_cosine(SurfaceView s, vec3 l) {
     float d = ggx_distribution(n_h, dot(n_cross_h, n_cross_h), s.alpha);
     float reflection = d * ggx_visibility(s.n_v, n_l, s.alpha);
     float grazing = schlick_weight(v_h);
-    vec3 fresnel = s.optics.f0 * (1.0f - grazing) + splat3(s.optics.f90 * grazing);
-
-    vec2 albedo = ggx_directional_albedo(s.optics.roughness, n_l);
-    float lost = 1.0f / max(albedo.x + albedo.y, 1e-3f) - 1.0f;
-    vec3 passed = splat3(1.0f) - reflected_share(s.optics.f0, s.optics.f90, splat3(1.0f) + s.optics.f0 * lost, albedo);
+    vec3 fresnel = s.f0 * (1.0f - grazing) + splat3(s.optics.f90 * grazing);
+    float passed =
+        1.0f - reflected_share(s.optics.dielectric_f0, s.optics.f90, ggx_directional_albedo(s.optics.roughness, n_l));
     return (fresnel * s.gain * reflection + s.base_in * passed) * n_l;
 }
 

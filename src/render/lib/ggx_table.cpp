@@ -34,7 +34,9 @@ GgxAlbedo integrate_ggx_albedo(double roughness, double n_v, int side) {
     for (int i = 0; i < side; ++i) {
         const double phi = std::numbers::pi * (i + 0.5) / side;  // half the circle: the other half mirrors it
         for (int j = 0; j < side; ++j) {
-            const double z = (1 - (j + 0.5) / side) * (1 + wz) - wz;
+            // Dense where few microfacets lie far from the normal and send light below the surface.
+            const double v = 1 - (j + 0.5) / side, density = 2 * v;
+            const double z = v * v * (1 + wz) - wz;
             const double r = std::sqrt(std::max(0.0, 1 - z * z));
             double hx = alpha * (r * std::cos(phi) + wx), hy = alpha * r * std::sin(phi), hz = std::max(z + wz, 0.0);
             const double length = std::sqrt(hx * hx + hy * hy + hz * hz);
@@ -42,7 +44,7 @@ GgxAlbedo integrate_ggx_albedo(double roughness, double n_v, int side) {
             const double v_h = std::clamp(sine * hx + cosine * hz, 0.0, 1.0);
             const double n_l = 2 * v_h * hz - cosine;
             if (n_l <= 0) continue;
-            const double weight = (1 + lambda_v) / (1 + lambda_v + lambda(std::min(n_l, 1.0), alpha));
+            const double weight = density * (1 + lambda_v) / (1 + lambda_v + lambda(std::min(n_l, 1.0), alpha));
             const double grazing = std::pow(1 - v_h, 5);
             of_f0 += weight * (1 - grazing);
             of_f90 += weight * grazing;

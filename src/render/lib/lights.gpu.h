@@ -19,7 +19,8 @@ KILN_CONST uint kLightSpot = 2u;
 
 // One light in a storage buffer (64 bytes); made by light_record() in pack.h.
 struct LightRecord {
-    vec4 position;   // world metres; w: radius of its disc in metres; directional: tangent of the half angle the disc is seen under
+    vec4
+        position;  // world metres; w: radius of its disc in metres; directional: tangent of the half angle the disc is seen under
     vec4 direction;  // unit, the way the light goes; w: 1 / range², 0 where no range ends it
     vec4 color;      // lux or candela, times colour; w: unused, 0
     uint kind;
@@ -29,10 +30,10 @@ struct LightRecord {
 
 // A light as one point sees it.
 struct LightSample {
-    vec3 l;              // unit, towards the light's centre
-    float distance;      // metres to it; 1e30 for directional lights
-    vec3 illuminance;    // across l, before shadow
-    float tan_radius;    // radius of its disc over its distance; 0: a hard shadow
+    vec3 l;            // unit, towards the light's centre
+    float distance;    // metres to it; 1e30 for directional lights
+    vec3 illuminance;  // across l, before shadow
+    float tan_radius;  // radius of its disc over its distance; 0: a hard shadow
 };
 
 // Windowed inverse square: 1 / d², brought to 0 at the range. Inside the light's own radius it grows no more.
@@ -42,7 +43,9 @@ KILN_FN float light_falloff(float distance2, float radius, float inverse_range2)
     return window / max(distance2, max(radius * radius, 1e-6f));
 }
 
-KILN_FN float spot_falloff(float cosine, float scale, float offset) { return square(saturate(cosine * scale + offset)); }
+KILN_FN float spot_falloff(float cosine, float scale, float offset) {
+    return square(saturate(cosine * scale + offset));
+}
 
 KILN_FN LightSample sample_light(LightRecord light, vec3 p_world) {
     LightSample s;

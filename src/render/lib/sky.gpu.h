@@ -24,7 +24,8 @@ struct SkyParams {
 KILN_FN vec3 sky_zonal(SkyParams sky, float height, float keep_1, float keep_2) {
     float p1 = height * keep_1;
     float p2 = (1.5f * height * height - 0.5f) * keep_2;
-    return vec3(max(sky.c0.x + sky.c1.x * p1 + sky.c2.x * p2, 0.0f), max(sky.c0.y + sky.c1.y * p1 + sky.c2.y * p2, 0.0f),
+    return vec3(max(sky.c0.x + sky.c1.x * p1 + sky.c2.x * p2, 0.0f),
+                max(sky.c0.y + sky.c1.y * p1 + sky.c2.y * p2, 0.0f),
                 max(sky.c0.z + sky.c1.z * p1 + sky.c2.z * p2, 0.0f));
 }
 

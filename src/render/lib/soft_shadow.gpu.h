@@ -36,8 +36,8 @@ struct ShadowMarch {
 // What one ray found. state: 0 stopped, 1 got through, -1 stopped and the whole disc is covered.
 struct ShadowSight {
     int state;
-    float x;      // distance of the nearest silhouette, in radii of the disc, at most 1
-    vec2 away;    // unit, on the disc: away from that silhouette; (0, 0) where x is 1
+    float x;    // distance of the nearest silhouette, in radii of the disc, at most 1
+    vec2 away;  // unit, on the disc: away from that silhouette; (0, 0) where x is 1
 };
 
 // Unit direction from the lit point to (x, y) of the unit disc around l.
@@ -46,9 +46,11 @@ KILN_FN vec3 shadow_direction(vec3 l, float tan_radius, vec2 on_disc) {
     return normalize(l + basis.tangent * (on_disc.x * tan_radius) + basis.bitangent * (on_disc.y * tan_radius));
 }
 
-// Looks from p towards `on_disc`. Only the middle ray needs to know how deep it is stopped.
+// Looks from p towards `on_disc`. Only the middle ray needs to know how deep it is stopped. One call of the field serves the
+// march and the four samples around the closest approach after it: shaders copy every call.
 KILN_FN ShadowSight shadow_look(vec3 p, vec3 l, float tan_radius, vec2 on_disc, bool measure_depth, ShadowMarch march) {
     vec3 direction = shadow_direction(l, tan_radius, on_disc);
+    Basis basis = basis_around(l);
     ShadowSight sight;
     sight.state = 1;
     sight.x = 1.0f;
@@ -56,9 +58,32 @@ KILN_FN ShadowSight shadow_look(vec3 p, vec3 l, float tan_radius, vec2 on_disc, 
     float t = march.t_first;
     float nearest_t = -1.0f;
     float nearest = 0.0f;
-    for (int i = 0; i < march.most_steps; i++) {
-        if (t >= march.t_last) break;
-        vec2 f = shadow_field(p + direction * t);
+    float across = 0.0f;
+    float along = 0.0f;
+    int probe = -1;  // 0 … 3 once the march is over
+    for (int i = 0; i < march.most_steps + 4; i++) {
+        if (probe < 0 && (t >= march.t_last || i >= march.most_steps)) {
+            if (sight.state != 1 || nearest_t < 0.0f) return sight;
+            probe = 0;
+        }
+        vec3 at = p + direction * t;
+        if (probe >= 0) {
+            float reach = max(0.25f * nearest, march.smallest_step);
+            float side = (probe & 1) == 0 ? reach : -reach;
+            vec3 q = p + direction * nearest_t;
+            at = probe < 2 ? q + basis.tangent * side : q + basis.bitangent * side;
+        }
+        vec2 f = shadow_field(at);
+        if (probe >= 0) {
+            float turned = (probe & 1) == 0 ? f.x : -f.x;
+            if (probe < 2)
+                across = across + turned;
+            else
+                along = along + turned;
+            probe++;
+            if (probe > 3) break;
+            continue;
+        }
         float cone = t * tan_radius;
         if (f.x <= 0.0f) {
             sight.state = 0;
@@ -78,43 +103,52 @@ KILN_FN ShadowSight shadow_look(vec3 p, vec3 l, float tan_radius, vec2 on_disc, 
             t = t + max(max(clear, close), march.smallest_step);
         }
     }
-    if (sight.state == 1 && nearest_t >= 0.0f) {
-        Basis basis = basis_around(l);
-        vec3 q = p + direction * nearest_t;
-        float reach = max(0.25f * nearest, march.smallest_step);
-        float across = shadow_field(q + basis.tangent * reach).x - shadow_field(q - basis.tangent * reach).x;
-        float along = shadow_field(q + basis.bitangent * reach).x - shadow_field(q - basis.bitangent * reach).x;
-        float size = sqrt(across * across + along * along);
-        if (size > 0.0f) sight.away = vec2(across / size, along / size);
-    }
+    float size = sqrt(across * across + along * along);
+    if (size > 0.0f) sight.away = vec2(across / size, along / size);
     return sight;
 }
 
 // Visible fraction of the disc around l (unit, from p), whose radius is tan_radius of its distance; 0: a hard shadow.
 KILN_FN float shadow_visible(vec3 p, vec3 l, float tan_radius, ShadowMarch march) {
     vec2 at = vec2(0.0f, 0.0f);
-    ShadowSight sight = shadow_look(p, l, tan_radius, at, tan_radius > 0.0f, march);
-    if (sight.state < 0) return 0.0f;
-    if (tan_radius <= 0.0f || (sight.state == 1 && sight.x >= 1.0f)) return sight.state == 1 ? 1.0f : 0.0f;
-    // Six rays miss at most the last 3 % of the disc. Opposite ones in turn find a way out soonest.
-    for (int i = 0; i < 6; i++) {
-        if (sight.state == 1) break;
-        float side = (i & 1) == 0 ? 1.0f : -1.0f;
-        float turn = float(i / 2) * (kPi / 3.0f);
-        at = vec2(side * cos(turn), side * sin(turn));
-        sight = shadow_look(p, l, tan_radius, at, false, march);
+    ShadowSight sight;
+    sight.state = 0;
+    sight.x = 1.0f;
+    sight.away = vec2(0.0f, 0.0f);
+    // Look 0 is at the middle. 1 to 6, until one gets through, are at the rim: they miss at most the last 3 % of the disc, and
+    // opposite ones in turn find a way out soonest. 7 looks for another silhouette on the far side of the first.
+    for (int look = 0; look < 8; look++) {
+        vec2 to = vec2(0.0f, 0.0f);
+        if (look > 0 && look < 7) {
+            if (sight.state == 1) continue;
+            float side = (look & 1) == 1 ? 1.0f : -1.0f;
+            float turn = float((look - 1) / 2) * (kPi / 3.0f);
+            to = vec2(side * cos(turn), side * sin(turn));
+        }
+        if (look == 7) {
+            if (sight.state != 1) return 0.0f;
+            // A rim ray that is all clear says no more than that.
+            if (sight.x >= 1.0f) return disc_visible(0.0f);
+            to = vec2(-sight.away.x, -sight.away.y);
+        }
+        ShadowSight seen = shadow_look(p, l, tan_radius, to, look == 0 && tan_radius > 0.0f, march);
+        if (look == 7) {
+            // The edge is at x - towards along `away`.
+            float towards = at.x * sight.away.x + at.y * sight.away.y;
+            float visible = disc_visible(sight.x - towards);
+            if (seen.state == 1 && sight.away.x * seen.away.x + sight.away.y * seen.away.y < 0.0f) {
+                visible = visible + disc_visible(seen.x - (to.x * seen.away.x + to.y * seen.away.y));
+            }
+            return min(visible, 1.0f);
+        }
+        sight = seen;
+        at = to;
+        if (look == 0) {
+            if (sight.state < 0) return 0.0f;
+            if (tan_radius <= 0.0f || (sight.state == 1 && sight.x >= 1.0f)) return sight.state == 1 ? 1.0f : 0.0f;
+        }
     }
-    if (sight.state != 1) return 0.0f;
-    float towards = at.x * sight.away.x + at.y * sight.away.y;
-    // The edge is at `towards - x` along `away`. A ray that is all clear says no more than that.
-    float visible = disc_visible(sight.x - towards);
-    if (sight.x >= 1.0f) return disc_visible(0.0f);
-    vec2 back = vec2(-sight.away.x, -sight.away.y);
-    ShadowSight other = shadow_look(p, l, tan_radius, back, false, march);
-    if (other.state == 1 && sight.away.x * other.away.x + sight.away.y * other.away.y < 0.0f) {
-        visible = visible + disc_visible(other.x - (back.x * other.away.x + back.y * other.away.y));
-    }
-    return min(visible, 1.0f);
+    return 0.0f;
 }
 
 // Part i of n equal parts of the unit disc, as a disc: its centre; every part has radius 1 / sqrt(n). Parts lie on a
