@@ -43,7 +43,7 @@ KILN_FN vec3 tone_aces(vec3 c) {
 }
 
 // Khronos PBR Neutral (2024): base colours below 0.8 come out as they went in, minus the 4 % of Fresnel reflection that a
-// white light adds to them; above, brightness is compressed and desaturates slowly, so hues hold.
+// white light adds to them; above, brightness is compressed and desaturates slowly towards white, so hues hold.
 KILN_FN vec3 tone_neutral(vec3 c) {
     float start = 0.8f - 0.04f;
     float lowest = smallest3(c);
@@ -55,7 +55,7 @@ KILN_FN vec3 tone_neutral(vec3 c) {
     float new_peak = 1.0f - room * room / (peak + room - start);
     v = v * (new_peak / peak);
     float toward_white = 1.0f - 1.0f / (0.15f * (peak - new_peak) + 1.0f);
-    v = mix(v, splat3(new_peak), toward_white);
+    v = mix(v, splat3(1.0f), toward_white);
     return vec3(saturate(v.x), saturate(v.y), saturate(v.z));
 }
 
