@@ -29,8 +29,9 @@ int compare(const Options& o) {
         return finish_data();
     }
     char line[200];
-    std::snprintf(line, sizeof line, "flip     %.6f   (0 is equal)\npsnr     %.2f dB\nssim     %.6f   (1 is equal)\nmax_abs  %.6f\n", d->flip, d->psnr,
-                  d->ssim, d->max_abs);
+    std::snprintf(line, sizeof line,
+                  "flip     %.6f   (0 is equal)\npsnr     %.2f dB\nssim     %.6f   (1 is equal)\nmax_abs  %.6f\n",
+                  d->flip, d->psnr, d->ssim, d->max_abs);
     (void)put(line);
     return finish_data();
 }

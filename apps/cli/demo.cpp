@@ -21,7 +21,8 @@ struct Options {
 int demo(Options o) {
     const auto scenes = bundled_scenes();
     if (o.list) {
-        for (const auto& [name, description] : scenes) (void)put(name + std::string(name.size() < 9 ? 9 - name.size() : 1, ' ') + description + "\n");
+        for (const auto& [name, description] : scenes)
+            (void)put(name + std::string(name.size() < 9 ? 9 - name.size() : 1, ' ') + description + "\n");
         return finish_data();
     }
     std::vector<std::string_view> names;
@@ -55,7 +56,8 @@ void add_demo(CLI::App& app, Run& run) {
     verb->add_option("NAME", o->picture.scene, "a bundled scene")->capture_default_str();
     verb->add_flag("--list", o->list, "the bundled scenes, on stdout");
     verb->add_option("--size", o->picture.size, "WIDTHxHEIGHT in pixels")->capture_default_str();
-    verb->add_option("--device", o->picture.device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
+    verb->add_option("--device", o->picture.device, "auto, cpu-vulkan or part of a device's name")
+        ->capture_default_str();
     verb->callback([o, &run] { run = [o] { return demo(*o); }; });
 }
 

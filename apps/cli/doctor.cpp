@@ -19,9 +19,10 @@ int doctor(bool json) {
     const std::vector<DeviceInfo> found = devices();
     bool usable = false;
     for (const DeviceInfo& d : found) usable = usable || d.usable;
-    const std::string advice = found.empty() ? "no Vulkan driver found; on Debian or Ubuntu: apt install mesa-vulkan-drivers"
-                               : usable      ? ""
-                                             : "no device is usable; a CPU renderer always is: apt install mesa-vulkan-drivers";
+    const std::string advice =
+        found.empty() ? "no Vulkan driver found; on Debian or Ubuntu: apt install mesa-vulkan-drivers"
+        : usable      ? ""
+                      : "no device is usable; a CPU renderer always is: apt install mesa-vulkan-drivers";
     if (json) {
         std::string list;
         for (const DeviceInfo& d : found) {
@@ -38,10 +39,11 @@ int doctor(bool json) {
         (void)put(out.line());
         return finish_data();
     }
-    (void)put("kiln " + std::string(version()) + ", " + std::to_string(std::thread::hardware_concurrency()) + " threads\n");
+    (void)put("kiln " + std::string(version()) + ", " + std::to_string(std::thread::hardware_concurrency()) +
+              " threads\n");
     for (const DeviceInfo& d : found) {
-        (void)put((d.usable ? "usable   " : "unusable ") + d.name + " (" + d.kind + ", " + d.backend + " " + d.api_version + ", " + d.driver + ")" +
-                  (d.usable ? "" : ": " + d.why_not) + "\n");
+        (void)put((d.usable ? "usable   " : "unusable ") + d.name + " (" + d.kind + ", " + d.backend + " " +
+                  d.api_version + ", " + d.driver + ")" + (d.usable ? "" : ": " + d.why_not) + "\n");
     }
     if (!advice.empty()) (void)put("mend     " + advice + "\n");
     (void)put("works    query, inspect, validate and schema need no device\n");

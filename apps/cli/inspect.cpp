@@ -72,10 +72,11 @@ void add_inspect(CLI::App& app, Run& run) {
 
 void add_validate(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App* verb = app.add_subcommand("validate",
-                                        "Checks a scene; the error tells file, line, column, key and mend. Needs no device.\n\n"
-                                        "Examples:\n"
-                                        "  kiln validate my.kiln.json");
+    CLI::App* verb =
+        app.add_subcommand("validate",
+                           "Checks a scene; the error tells file, line, column, key and mend. Needs no device.\n\n"
+                           "Examples:\n"
+                           "  kiln validate my.kiln.json");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_flag("--json", o->json, "one object, on stdout");
     verb->callback([o, &run] { run = [o] { return validate(*o); }; });

@@ -36,20 +36,22 @@ int unknown_verb(const std::string& word) {
         return kUsage;
     }
     const std::string_view near = nearest_word(word, kVerbs);
-    say("kiln: there is no verb \"" + word + "\"; " + (near.empty() ? "`kiln --help` lists them" : "did you mean `kiln " + std::string(near) + "`?"));
+    say("kiln: there is no verb \"" + word + "\"; " +
+        (near.empty() ? "`kiln --help` lists them" : "did you mean `kiln " + std::string(near) + "`?"));
     return kUsage;
 }
 
 int run(int argc, char** argv) {
     if (argc > 1 && argv[1][0] != '-' && !contains(kVerbs, argv[1])) return unknown_verb(argv[1]);
 
-    CLI::App app("Kiln, a game engine whose worlds are signed distance fields.\n\n"
-                 "Examples:\n"
-                 "  kiln demo                                    a first picture\n"
-                 "  kiln render potter -o potter.png             a bundled scene, or a NAME.kiln.json file\n"
-                 "  kiln query potter --points points.csv        distances, normals and materials\n"
-                 "  kiln validate my.kiln.json                   errors with line and column",
-                 "kiln");
+    CLI::App app(
+        "Kiln, a game engine whose worlds are signed distance fields.\n\n"
+        "Examples:\n"
+        "  kiln demo                                    a first picture\n"
+        "  kiln render potter -o potter.png             a bundled scene, or a NAME.kiln.json file\n"
+        "  kiln query potter --points points.csv        distances, normals and materials\n"
+        "  kiln validate my.kiln.json                   errors with line and column",
+        "kiln");
     app.set_version_flag("--version", std::string("kiln ") + std::string(version()));
     app.require_subcommand(0, 1);
     Run verb;

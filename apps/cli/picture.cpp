@@ -38,7 +38,8 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     if (!known) {
         const std::string_view near = nearest_word(o.view, kViews);
         return usage("--view " + o.view + ": there is no such view; " +
-                     (near.empty() ? "use shaded, albedo, normal, depth, steps or bricks" : "did you mean " + std::string(near) + "?"));
+                     (near.empty() ? "use shaded, albedo, normal, depth, steps or bricks"
+                                   : "did you mean " + std::string(near) + "?"));
     }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
@@ -51,7 +52,8 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
 
 Result<void> check_output(const std::string& path) {
     if (path == "-") return usage("-o -: pictures are not written to stdout; name a file");
-    if (!path.ends_with(".png") && !path.ends_with(".exr")) return usage("-o " + path + ": unknown kind of picture; end the name in .png or .exr");
+    if (!path.ends_with(".png") && !path.ends_with(".exr"))
+        return usage("-o " + path + ": unknown kind of picture; end the name in .png or .exr");
     return writable(path);
 }
 
@@ -79,13 +81,19 @@ void introduce(const RenderStats& stats) {
         (display ? "; windows come with a later version" : "; no display found") + " → rendering to a file");
 }
 
-std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame, double load, double total) {
+std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame,
+                   double load, double total) {
     std::string passes;
-    for (const auto& [name, ms] : stats.passes) passes += (passes.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(ms);
+    for (const auto& [name, ms] : stats.passes)
+        passes += (passes.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(ms);
     Json json;
-    json.text("device", stats.device).raw("size", "[" + std::to_string(s.width) + ", " + std::to_string(s.height) + "]");
+    json.text("device", stats.device)
+        .raw("size", "[" + std::to_string(s.width) + ", " + std::to_string(s.height) + "]");
     json.text("view", o.view).text("output", o.output);
-    json.number("edits", stats.edits).number("bricks", stats.bricks).number("frame_ms", stats.frame_ms).raw("passes", "{" + passes + "}");
+    json.number("edits", stats.edits)
+        .number("bricks", stats.bricks)
+        .number("frame_ms", stats.frame_ms)
+        .raw("passes", "{" + passes + "}");
     json.number("evaluations", double(stats.evaluations)).number("atlas_bytes", double(stats.atlas_bytes));
     json.number("host_bytes", double(stats.host_bytes)).number("pipelines_created", double(stats.pipelines_created));
     json.number("coarsened", frame.coarsened).number("load_s", load).number("total_s", total);
@@ -133,12 +141,14 @@ int render_picture(const PictureOptions& o) {
         for (const std::string& section : world->not_drawn_yet()) later += (later.empty() ? "" : ", ") + section;
         if (!later.empty()) say("note     this version does not draw: " + later);
         if (frame->coarsened > 0)
-            say("note     too large for the brick pool: drawn with voxels " + std::to_string(1 << std::min(frame->coarsened, 30)) + " times as large");
-        say(o.scene + "   " + with_commas(uint64_t(stats.edits)) + " edits → " + with_commas(uint64_t(stats.bricks)) + " bricks   loaded in " +
-            brief(load, "s") + "   frame " + std::to_string(settings->width) + "×" + std::to_string(settings->height) + " in " +
-            brief(stats.frame_ms, "ms"));
+            say("note     too large for the brick pool: drawn with voxels " +
+                std::to_string(1 << std::min(frame->coarsened, 30)) + " times as large");
+        say(o.scene + "   " + with_commas(uint64_t(stats.edits)) + " edits → " + with_commas(uint64_t(stats.bricks)) +
+            " bricks   loaded in " + brief(load, "s") + "   frame " + std::to_string(settings->width) + "×" +
+            std::to_string(settings->height) + " in " + brief(stats.frame_ms, "ms"));
         say("wrote    " + o.output);
-        if (o.transcript) say("next     kiln render " + o.scene + " -o " + o.scene + ".exr   ·   kiln demo --list   ·   kiln doctor");
+        if (o.transcript)
+            say("next     kiln render " + o.scene + " -o " + o.scene + ".exr   ·   kiln demo --list   ·   kiln doctor");
     }
     if (!o.json) return kDone;
     (void)put(report(o, *settings, stats, *frame, load, total.seconds()));

@@ -37,7 +37,8 @@ public:
         Input in;
         in.name_ = path == "-" ? "stdin" : path;
         in.file_.reset(path == "-" ? stdin : std::fopen(path.c_str(), "rb"));
-        if (!in.file_) return Error{path + ": cannot be read: " + std::strerror(errno) + "; check the name", ErrorKind::Input};
+        if (!in.file_)
+            return Error{path + ": cannot be read: " + std::strerror(errno) + "; check the name", ErrorKind::Input};
         return in;
     }
 
@@ -47,8 +48,9 @@ public:
             const size_t first = line_.find_first_not_of(" \t");
             if (first == std::string::npos) continue;
             const char c = line_[first];
-            const bool header = !seen_ && (c == '_' || c == '"' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')) && !line_.starts_with("nan") &&
-                                !line_.starts_with("inf") && !line_.starts_with("NaN") && !line_.starts_with("Inf");
+            const bool header = !seen_ && (c == '_' || c == '"' || (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z')) &&
+                                !line_.starts_with("nan") && !line_.starts_with("inf") && !line_.starts_with("NaN") &&
+                                !line_.starts_with("Inf");
             seen_ = true;
             if (!header) return parse(row, columns);
         }
@@ -106,17 +108,22 @@ private:
             float v = 0;
             const std::string_view digits = field.starts_with('+') ? field.substr(1) : field;
             const auto [stop, code] = std::from_chars(digits.data(), digits.data() + digits.size(), v);
-            if (digits.empty() || (code == std::errc() && stop != digits.data() + digits.size()) || code == std::errc::invalid_argument)
+            if (digits.empty() || (code == std::errc() && stop != digits.data() + digits.size()) ||
+                code == std::errc::invalid_argument)
                 return fail("\"" + std::string(field.substr(0, 40)) + "\" is not a number; a row is " + names);
-            if (code == std::errc::result_out_of_range) v = std::abs(std::strtof(std::string(digits).c_str(), nullptr)) > 1 ? INFINITY : 0;
-            if (!std::isfinite(v)) return fail("\"" + std::string(field.substr(0, 40)) + "\" is not finite; write a finite number");
+            if (code == std::errc::result_out_of_range)
+                v = std::abs(std::strtof(std::string(digits).c_str(), nullptr)) > 1 ? INFINITY : 0;
+            if (!std::isfinite(v))
+                return fail("\"" + std::string(field.substr(0, 40)) + "\" is not finite; write a finite number");
             row.numbers[column] = v;
             if (column < 3) row.text[column] = field;
             ++column;
             if (end == line_.size()) break;
             at = end + 1;
         }
-        if (column < columns) return fail(std::to_string(column) + " columns where there must be " + std::to_string(columns) + "; a row is " + names);
+        if (column < columns)
+            return fail(std::to_string(column) + " columns where there must be " + std::to_string(columns) +
+                        "; a row is " + names);
         return true;
     }
 
@@ -172,7 +179,9 @@ void answer_rays(const World& world, const std::vector<Row>& rows, std::string& 
             continue;
         }
         out += "1,";
-        for (const float v : {hit.t, hit.position.x, hit.position.y, hit.position.z, hit.normal.x, hit.normal.y, hit.normal.z}) append(out, v);
+        for (const float v :
+             {hit.t, hit.position.x, hit.position.y, hit.position.z, hit.normal.x, hit.normal.y, hit.normal.z})
+            append(out, v);
         const Edit* edit = world.find(hit.edit);
         append_name(out, edit ? std::string_view(edit->name) : std::string_view());
     }
@@ -229,7 +238,8 @@ void add_query(CLI::App& app, Run& run) {
                                         "  kiln query quarry --points points.csv > answers.csv\n"
                                         "  kiln query quarry --rays --points rays.csv");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
-    verb->add_option("--points", o->points, "CSV of x,y,z (rays: ox,oy,oz,dx,dy,dz), a header is optional; - for stdin")->required();
+    verb->add_option("--points", o->points, "CSV of x,y,z (rays: ox,oy,oz,dx,dy,dz), a header is optional; - for stdin")
+        ->required();
     verb->add_flag("--field", o->bricks, "from the bricks instead of the exact edits");
     verb->add_flag("--rays", o->rays, "rows are rays; answers hit,t,x,y,z,nx,ny,nz,edit");
     verb->add_flag("--nearest", o->nearest, "true nearest-surface distance");

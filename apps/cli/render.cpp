@@ -24,7 +24,8 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps or bricks")->capture_default_str();
     verb->add_option("--device", o->device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
     verb->add_flag("--analytic", o->analytic, "march the edits themselves instead of the bricks");
-    verb->add_option("--reference", o->reference, "path-trace on the CPU with this many samples a pixel (no device needed)");
+    verb->add_option("--reference", o->reference,
+                     "path-trace on the CPU with this many samples a pixel (no device needed)");
     verb->add_flag("--unpruned", o->unpruned, "with --analytic: every edit at every step");
     verb->add_flag("--no-accelerate", o->no_accelerate, "visit every cell: the slow twin of the jumps");
     verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");

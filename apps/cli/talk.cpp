@@ -19,11 +19,20 @@ void say(std::string_view line) {
 
 int fail(const Error& error) {
     switch (error.kind) {
-    case ErrorKind::Usage: say("kiln: " + error.message); return kUsage;
-    case ErrorKind::Input: say(error.message); return kBadInput;
-    case ErrorKind::NoDevice: say("kiln: " + error.message + " (`kiln doctor` tells what this machine can do)"); return kNoDevice;
-    case ErrorKind::OutOfMemory: say("kiln: " + error.message); return kOutOfMemory;
-    case ErrorKind::Failed: break;
+    case ErrorKind::Usage:
+        say("kiln: " + error.message);
+        return kUsage;
+    case ErrorKind::Input:
+        say(error.message);
+        return kBadInput;
+    case ErrorKind::NoDevice:
+        say("kiln: " + error.message + " (`kiln doctor` tells what this machine can do)");
+        return kNoDevice;
+    case ErrorKind::OutOfMemory:
+        say("kiln: " + error.message);
+        return kOutOfMemory;
+    case ErrorKind::Failed:
+        break;
     }
     say("kiln: " + error.message);
     return kFailed;
@@ -38,11 +47,14 @@ int finish_data() {
 }
 
 Result<void> writable(const std::string& path) {
-    const auto cannot = [&](int code) { return Error{"cannot write " + path + ": " + std::strerror(code), ErrorKind::Failed}; };
+    const auto cannot = [&](int code) {
+        return Error{"cannot write " + path + ": " + std::strerror(code), ErrorKind::Failed};
+    };
     struct stat info {};
     if (::stat(path.c_str(), &info) == 0) {
         if (S_ISDIR(info.st_mode)) return cannot(EISDIR);
-        if (!S_ISREG(info.st_mode)) return ::access(path.c_str(), W_OK) == 0 ? Result<void>() : Result<void>(cannot(errno));
+        if (!S_ISREG(info.st_mode))
+            return ::access(path.c_str(), W_OK) == 0 ? Result<void>() : Result<void>(cannot(errno));
     }
     const size_t slash = path.find_last_of('/');
     const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);

@@ -26,11 +26,12 @@ public:
         center_ = center;
         radius_ = radius;
         // The centre is rounded to float: a little more room for that.
-        sdf::prune(sdf::view(program_), to_float(center), float(radius + 1e-6 * largest(center)) * 1.001f, code_, scratch_);
+        sdf::prune(sdf::view(program_), to_float(center), float(radius + 1e-6 * largest(center)) * 1.001f, code_,
+                   scratch_);
     }
     bool covers(dvec3 p) const {
         const dvec3 d = add(p, center_, -1);
-        return d.x * d.x + d.y * d.y + d.z * d.z <= radius_ * radius_;
+        return radius_ >= 0 && d.x * d.x + d.y * d.y + d.z * d.z <= radius_ * radius_;
     }
     double at(dvec3 p, sdf::MaterialMix* mix = nullptr, bool edits = false) const {
         return sdf::evaluate(sdf::view(program_, code_), p, mix, edits);
@@ -42,7 +43,7 @@ private:
     std::vector<sdf::Instruction> code_;
     sdf::PruneScratch scratch_;
     dvec3 center_;
-    double radius_ = -1;
+    double radius_ = -1;  // nowhere yet
 };
 
 // Step of the central differences, metres: far above double's rounding, far below any detail.
@@ -81,7 +82,9 @@ double length_of(const Box3& box) { return double(length(box.max - box.min)); }
 uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> code, dvec3 p) {
     constexpr size_t kMost = 3 + 2 * size_t(kMaxParams);
     constexpr size_t kEditWord = 2;  // of a Shape's numbers: scale, material, edit
-    const auto has_edit = [](const sdf::Instruction& i) { return i.opcode() == sdf::Opcode::Shape || i.opcode() == sdf::Opcode::Constant; };
+    const auto has_edit = [](const sdf::Instruction& i) {
+        return i.opcode() == sdf::Opcode::Shape || i.opcode() == sdf::Opcode::Constant;
+    };
     std::vector<uint32_t> edits;
     for (const sdf::Instruction& i : code)
         if (has_edit(i)) edits.push_back(uint32_t(program.params[i.param + kEditWord]));
@@ -92,13 +95,15 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
     std::vector<float> params;
     params.reserve(copy.size() * kMost);
     for (sdf::Instruction& i : copy) {
-        const auto first = program.params.begin() + std::min<std::ptrdiff_t>(i.param, std::ptrdiff_t(program.params.size()));
+        const auto first =
+            program.params.begin() + std::min<std::ptrdiff_t>(i.param, std::ptrdiff_t(program.params.size()));
         const auto last = first + std::min<std::ptrdiff_t>(kMost, program.params.end() - first);
         const size_t at = params.size();
         params.insert(params.end(), first, last);
         params.resize(at + kMost);
         if (has_edit(i)) {
-            const auto rank = std::lower_bound(edits.begin(), edits.end(), uint32_t(params[at + kEditWord])) - edits.begin();
+            const auto rank =
+                std::lower_bound(edits.begin(), edits.end(), uint32_t(params[at + kEditWord])) - edits.begin();
             params[at + kEditWord] = float(rank);
         }
         i.param = uint32_t(at);
@@ -152,7 +157,8 @@ RayHit ExactField::cast(const Ray& ray) const {
     const double length = std::sqrt(double(dot(ray.direction, ray.direction)));
     if (!(length > 0) || program_.edits.empty()) return out;
     const dvec3 o{double(ray.origin.x), double(ray.origin.y), double(ray.origin.z)};
-    const dvec3 dir{double(ray.direction.x) / length, double(ray.direction.y) / length, double(ray.direction.z) / length};
+    const dvec3 dir{double(ray.direction.x) / length, double(ray.direction.y) / length,
+                    double(ray.direction.z) / length};
     double t = 0, end = std::min(double(ray.t_max), 1e10);
     double extent = 64;  // metres: how large the pruned balls are
     if (!program_.unbounded) {
@@ -195,7 +201,7 @@ RayHit ExactField::cast(const Ray& ray) const {
     const dvec3 p = add(o, dir, t);
     local.move_to(p, 4 * gradient_step(p));
     out.hit = true;
-    out.t = float(t / length);
+    out.t = float(t);
     out.position = to_float(p);
     out.normal = gradient(local, p);
     out.edit = {edit_at(program_, local.code(), p), 0};

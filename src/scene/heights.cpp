@@ -17,8 +17,8 @@ bool has_file(const Node& node) {
 
 }  // namespace
 
-Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects, const std::string& folder, Grids& grids,
-                              sdf::Fault* fault) {
+Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects,
+                              const std::string& folder, Grids& grids, sdf::Fault* fault) {
     GridSource out;
     out.edits = edits;
     out.objects = objects;

@@ -16,6 +16,9 @@ struct Grids {
     std::map<std::string, uint32_t> by_file;
 };
 
+/// The grey values of a PNG image, 0 for black and 1 for white, as they stand (no gamma).
+Result<sdf::HeightGrid> load_heights(const std::string& path);
+
 /// What sdf::compile reads. Edits and objects are copied only when some shape has a file.
 struct GridSource {
     std::span<const Edit> edits;
@@ -28,7 +31,7 @@ struct GridSource {
 };
 
 /// Loads what is missing from `grids`, which must outlive the result. `folder` is put before relative names.
-Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects, const std::string& folder, Grids& grids,
-                              sdf::Fault* fault = nullptr);
+Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects,
+                              const std::string& folder, Grids& grids, sdf::Fault* fault = nullptr);
 
 }  // namespace kiln::scene

@@ -15,6 +15,7 @@ constexpr uint32_t kDeepestIndent =
 
 template <typename T>
 void append_number(std::string& out, T value) {
+    if (value == 0) value = 0;  // "-0" reads as a slip
     char buffer[40];
     const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);
     out.append(buffer, result.ptr);

@@ -18,7 +18,8 @@ using Members = std::vector<std::pair<std::string_view, JsonIndex>>;  // key, wh
 
 class SceneWriter {
 public:
-    SceneWriter(const SceneData& scene, const SceneData::Stage& stage) : scene_(scene), stage_(stage), old_(scene.source) {}
+    SceneWriter(const SceneData& scene, const SceneData::Stage& stage)
+        : scene_(scene), stage_(stage), old_(scene.source) {}
 
     std::string run() {
         out_.open(JsonType::Object);
@@ -350,6 +351,8 @@ private:
 
 }  // namespace
 
-std::string write_scene(const SceneData& scene, const SceneData::Stage& stage) { return SceneWriter(scene, stage).run(); }
+std::string write_scene(const SceneData& scene, const SceneData::Stage& stage) {
+    return SceneWriter(scene, stage).run();
+}
 
 }  // namespace kiln::scene

@@ -84,29 +84,52 @@ Json numbers_of(const sdf::FieldRow& row) {
 Json value_of(const KeyRow& row) {
     Json out;
     switch (row.type) {
-    case KeyType::Numbers: return numbers_of(row.numbers);
+    case KeyType::Numbers:
+        return numbers_of(row.numbers);
     case KeyType::Scale: {
         const Json one = {{"type", "number"}, {"minimum", tidy(kSmallestScale)}, {"maximum", tidy(kLargestScale)}};
         out = {{"anyOf", {one, {{"type", "array"}, {"items", one}, {"minItems", 3}, {"maxItems", 3}}}}};
         break;
     }
-    case KeyType::Rotation: out = {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 4}, {"maxItems", 4}}; break;
-    case KeyType::Bool: out = {{"type", "boolean"}}; break;
-    case KeyType::Text: out = {{"type", "string"}}; break;
-    case KeyType::TextList: out = {{"type", "array"}, {"items", {{"type", "string"}}}, {"minItems", 1}}; break;
-    case KeyType::Choice: out = {{"enum", row.choices}}; break;
-    case KeyType::Object: out = reference(row.table->name); break;
+    case KeyType::Rotation:
+        out = {{"type", "array"}, {"items", {{"type", "number"}}}, {"minItems", 4}, {"maxItems", 4}};
+        break;
+    case KeyType::Bool:
+        out = {{"type", "boolean"}};
+        break;
+    case KeyType::Text:
+        out = {{"type", "string"}};
+        break;
+    case KeyType::TextList:
+        out = {{"type", "array"}, {"items", {{"type", "string"}}}, {"minItems", 1}};
+        break;
+    case KeyType::Choice:
+        out = {{"enum", row.choices}};
+        break;
+    case KeyType::Object:
+        out = reference(row.table->name);
+        break;
     case KeyType::List:
         out = {{"type", "array"}};
         if (row.table) out["items"] = reference(row.table->name);
         break;
-    case KeyType::Map: out = {{"type", "object"}, {"additionalProperties", reference(row.table->name)}, {"propertyNames", {{"minLength", 1}}}}; break;
+    case KeyType::Map:
+        out = {{"type", "object"},
+               {"additionalProperties", reference(row.table->name)},
+               {"propertyNames", {{"minLength", 1}}}};
+        break;
     case KeyType::Pinned:
         out = {{"anyOf",
                 {{{"enum", {"top", "corners"}}},
-                 {{"type", "array"}, {"items", {{"type", "array"}, {"items", {{"type", "integer"}, {"minimum", 0}}}, {"minItems", 2}, {"maxItems", 2}}}}}}};
+                 {{"type", "array"},
+                  {"items",
+                   {{"type", "array"},
+                    {"items", {{"type", "integer"}, {"minimum", 0}}},
+                    {"minItems", 2},
+                    {"maxItems", 2}}}}}}};
         break;
-    case KeyType::Node: break;  // written by nodes_of
+    case KeyType::Node:
+        break;  // written by nodes_of
     }
     out["description"] = row.doc;
     return out;
@@ -167,7 +190,10 @@ Json nodes_of(const Table& table) {
     };
     Json any = Json::array();
     const auto add = [&](std::string_view doc, Json properties, Json required) {
-        any.push_back({{"description", doc}, {"type", "object"}, {"properties", std::move(properties)}, {"required", std::move(required)},
+        any.push_back({{"description", doc},
+                       {"type", "object"},
+                       {"properties", std::move(properties)},
+                       {"required", std::move(required)},
                        {"additionalProperties", false}});
     };
     for (const sdf::KindRow& row : sdf::shape_rows()) {

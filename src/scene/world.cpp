@@ -9,6 +9,8 @@
 #include "scene/schema.h"
 #include "scene/suggest.h"
 
+#include "sdf/tables.h"
+
 #include "base/atomic_file.h"
 #include "base/format.h"
 
@@ -60,7 +62,9 @@ Result<World> World::load(const std::string& path_or_name) {
             if (file.name == path_or_name) return parse(file.json, path_or_name);
             names.push_back(file.name);
         }
-        return Error{formatted("{}: neither a file nor a bundled scene; {}", path_or_name, scene::suggestion(path_or_name, names)), ErrorKind::Input};
+        return Error{formatted("{}: neither a file nor a bundled scene; {}", path_or_name,
+                               scene::suggestion(path_or_name, names)),
+                     ErrorKind::Input};
     }
     auto text = read_file(path_or_name);
     if (!text) return text.error();
@@ -83,7 +87,9 @@ Result<World> World::parse(std::string_view json, const std::string& file_name) 
     return world;
 }
 
-std::string World::to_json() const { return scene::write_scene(impl_->data, {field_settings, lights, environment, cameras}); }
+std::string World::to_json() const {
+    return scene::write_scene(impl_->data, {field_settings, lights, environment, cameras});
+}
 
 Result<void> World::save(const std::string& path) const {
     auto file = AtomicFile::create(path);
@@ -105,9 +111,11 @@ MaterialId World::add_material(const std::string& name, const Material& material
 
 Result<ObjectId> World::add_object(Object object) {
     SceneData& data = impl_->data;
-    if (auto fault = scene::check_object(object, data.objects.size(), data.materials.size())) return Error{object.name + ": " + fault->message, fault->kind};
+    if (auto fault = scene::check_object(object, data.objects.size(), data.materials.size()))
+        return Error{object.name + ": " + fault->message, fault->kind};
     for (const Object& other : data.objects)
-        if (other.name == object.name) return Error{object.name + ": there is an object of this name; choose another", ErrorKind::Usage};
+        if (other.name == object.name)
+            return Error{object.name + ": there is an object of this name; choose another", ErrorKind::Usage};
     data.objects.push_back(std::move(object));
     Edit placed;
     placed.node.kind = Node::Kind::Object;
@@ -124,7 +132,8 @@ Result<EditId> World::add(Edit edit) {
     SceneData& data = impl_->data;
     if (auto fault = impl_->edit_fault(edit)) return std::move(*fault);
     if (edit.name.empty()) edit.name = impl_->free_name(edit);
-    if (impl_->position_of(edit.name)) return Error{edit.name + ": there is an edit of this name; choose another", ErrorKind::Usage};
+    if (impl_->position_of(edit.name))
+        return Error{edit.name + ": there is an edit of this name; choose another", ErrorKind::Usage};
     data.edits.push_back(std::move(edit));
     data.edit_places.push_back(SceneData::kNowhere);
     const EditId id = impl_->new_id(uint32_t(data.edits.size() - 1));
@@ -171,7 +180,8 @@ const Material* World::material(MaterialId id) const {
 }
 
 std::string_view World::material_name(MaterialId id) const {
-    return id && id.index < impl_->data.materials.size() ? std::string_view(impl_->data.materials[id.index].first) : std::string_view();
+    return id && id.index < impl_->data.materials.size() ? std::string_view(impl_->data.materials[id.index].first)
+                                                         : std::string_view();
 }
 
 std::string scene_schema_json() { return scene::schema_json(); }
@@ -206,7 +216,9 @@ EditId World::Impl::new_id(uint32_t position) {
 }
 
 std::optional<uint32_t> World::Impl::position(EditId id) const {
-    if (id.index >= slots.size() || slots[id.index].generation != id.generation || slots[id.index].position == UINT32_MAX) return std::nullopt;
+    if (id.index >= slots.size() || slots[id.index].generation != id.generation ||
+        slots[id.index].position == UINT32_MAX)
+        return std::nullopt;
     return slots[id.index].position;
 }
 
@@ -237,7 +249,8 @@ void World::Impl::erase(uint32_t position) {
 
 std::string World::Impl::free_name(const Edit& edit) const {
     const Node& n = edit.node;
-    const std::string base(n.kind == Node::Kind::Shape ? sdf::shape_rows()[n.shape.kind].name : data.objects[n.object.index].name);
+    const std::string base(n.kind == Node::Kind::Shape ? sdf::shape_rows()[n.shape.kind].name
+                                                       : data.objects[n.object.index].name);
     for (size_t i = data.edits.size() + 1;; ++i) {
         std::string name = formatted("{}-{}", base, i);
         if (!names.contains(name)) return name;
@@ -246,17 +259,18 @@ std::string World::Impl::free_name(const Edit& edit) const {
 
 std::optional<Error> World::Impl::edit_fault(const Edit& edit) {
     const std::string name = edit.name.empty() ? "edit" : edit.name;
-    if (auto fault = scene::check_edit(edit, data.objects.size(), data.materials.size())) return Error{name + ": " + fault->message, fault->kind};
+    if (auto fault = scene::check_edit(edit, data.objects.size(), data.materials.size()))
+        return Error{name + ": " + fault->message, fault->kind};
     if (auto fault = compile_fault(edit)) return Error{name + ": " + fault->message, fault->kind};
     return std::nullopt;
 }
 
 std::optional<Error> World::Impl::compile_fault(const Edit& edit) {
-    auto grids = scene::Grids();
+    const std::lock_guard lock(mutex);
     auto source = scene::with_grids(std::span(&edit, 1), data.objects, data.folder, grids);
     if (!source) return source.error();
-    auto program = sdf::compile(source->source());
-    return program ? std::nullopt : std::optional(program.error());
+    auto alone = sdf::compile(source->source());
+    return alone ? std::nullopt : std::optional(alone.error());
 }
 
 }  // namespace kiln

@@ -6,6 +6,8 @@
 #include "scene/suggest.h"
 #include "scene/world_impl.h"
 
+#include "sdf/tables.h"
+
 #include "base/format.h"
 
 #include <nlohmann/json.hpp>
@@ -23,7 +25,8 @@ constexpr double kMaxCells = double(1u << 25);
 constexpr int kMostDoublings = 24;
 
 bool same(const FieldSettings& a, const FieldSettings& b) {
-    return a.voxel_size == b.voxel_size && a.cells == b.cells && a.levels == b.levels && a.bounds == b.bounds && a.distance_8bit == b.distance_8bit;
+    return a.voxel_size == b.voxel_size && a.cells == b.cells && a.levels == b.levels && a.bounds == b.bounds &&
+           a.distance_8bit == b.distance_8bit;
 }
 
 float longest_side(const Box3& box) {
@@ -42,7 +45,7 @@ double cells_of(const Box3& box, float voxel) {
 void World::Impl::changed() {
     const std::lock_guard lock(mutex);
     program.reset();
-    built = {};
+    stale = true;
 }
 
 Result<std::shared_ptr<const sdf::Program>> World::Impl::compiled() {
@@ -84,7 +87,8 @@ Result<std::shared_ptr<const sdf::Program>> World::Impl::compiled() {
 World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const FieldSettings& settings) const {
     Resolution out;
     Box3 finite = p.bounds;
-    if (finite.empty()) finite = p.unbounded ? Box3{{-5, -5, -5}, {5, 5, 5}} : Box3{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
+    if (finite.empty())
+        finite = p.unbounded ? Box3{{-5, -5, -5}, {5, 5, 5}} : Box3{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
     out.voxel_size = settings.voxel_size > 0 ? settings.voxel_size : std::max(longest_side(finite) / 256, 1e-6f);
     if (settings.bounds) {
         out.bounds = *settings.bounds;
@@ -102,13 +106,23 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     auto compiled_program = compiled();
     if (!compiled_program) return compiled_program.error();
     const std::lock_guard lock(mutex);
-    if (built.field && same(settings, built_with)) return built;
+    const bool comparable = built.field && same(settings, built_with);
+    if (comparable && !stale) return built;
     if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
         return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
     if (settings.bounds && (settings.bounds->empty() || !settings.bounds->finite()))
         return Error{"field_settings.bounds must be finite, with min below max", ErrorKind::Usage};
     const Resolution r = resolution(**compiled_program, settings);
     Built next;
+    if (comparable && built.coarsened == 0 && built.field->options().voxel_size == r.voxel_size &&
+        built.field->options().bounds == r.bounds) {
+        // Only what the change reaches is made again.
+        if (auto updated = field::Field::update(*built.field, *compiled_program, {})) {
+            built.field = std::move(*updated);
+            stale = false;
+            return built;
+        }
+    }
     field::FieldOptions options;
     options.voxel_size = r.voxel_size;
     options.bounds = r.bounds;
@@ -124,6 +138,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     }
     built = next;
     built_with = settings;
+    stale = false;
     return next;
 }
 
@@ -138,10 +153,9 @@ FieldSample World::sample(vec3 p, FieldSource source) const { return sample(std:
 std::vector<FieldSample> World::sample(std::span<const vec3> points, FieldSource source) const {
     std::vector<FieldSample> out(points.size());
     for (FieldSample& s : out) s.distance = std::numeric_limits<float>::infinity();
+    if (source == FieldSource::Bricks && impl_->sample_bricks(points, field_settings, out.data())) return out;
     auto program = impl_->compiled();
-    if (!program) return out;
-    scene::ExactField(**program).sample(points, out.data());
-    if (source == FieldSource::Bricks) impl_->sample_bricks(points, field_settings, out.data());
+    if (program) scene::ExactField(**program).sample(points, out.data());
     return out;
 }
 
@@ -182,7 +196,8 @@ Result<Frame> World::frame(std::string_view camera) const {
         }
         names.push_back(name);
     }
-    return Error{formatted("there is no camera \"{}\"; {}", camera, scene::suggestion(camera, names)), ErrorKind::Usage};
+    return Error{formatted("there is no camera \"{}\"; {}", camera, scene::suggestion(camera, names)),
+                 ErrorKind::Usage};
 }
 
 std::string World::inspect_json() const {

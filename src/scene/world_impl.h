@@ -6,6 +6,7 @@
 #include "scene/scene_file.h"
 
 #include "field/field.h"
+#include "field/host_bricks.h"
 
 #include <kiln/world.h>
 
@@ -57,13 +58,15 @@ struct World::Impl {
     std::shared_ptr<const sdf::Program> program;
     Built built;
     FieldSettings built_with;
+    bool stale = false;                               ///< `built` is of an older program
+    std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
     scene::Grids grids;
 
     void changed();
     Result<std::shared_ptr<const sdf::Program>> compiled();
     Result<Built> field(const FieldSettings& settings);
-    /// Overwrites the answers at points that lie in a brick.
-    void sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);
+    /// Trilinear in bricks, exact elsewhere; false when there is no field.
+    bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);
 };
 
 }  // namespace kiln
