@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// One tile of a frame as passes on a graph, and what comes back from it.
+#pragma once
+
+#include "render/passes/passes.h"
+
+#include <kiln/renderer.h>
+
+namespace kiln::render {
+
+// Parameters of a frame from what its user asked for; the tile's fields are the whole picture.
+// Errors (kind Usage) for sizes and cameras that make no picture.
+Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& settings, const GpuField& field);
+std::vector<MaterialRecord> material_records(const Frame& frame);
+
+struct TileResult {
+    Readback radiance;  // 4 halves a pixel; of a view: 4 floats
+    Readback shown;     // 4 bytes a pixel
+    Readback depth;     // a float a pixel
+    Readback visibility;  // 4 words a pixel; only when asked for
+    std::vector<Readback> evaluations;
+};
+TileResult record_tile(Graph& g, const TileInputs& in, View view, bool want_visibility = false);
+
+// Kernels of a frame, for warm-up.
+std::vector<const Kernel*> frame_kernels(bool exact, View view);
+std::vector<const Kernel*> bake_kernels(rhi::Format format, bool by_copy);
+
+}  // namespace kiln::render

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: MIT
+#include "render/gpu_field.h"
+
+#include "base/assert.h"
+#include "base/format.h"
+#include "base/log.h"
+#include "render/graph_runner.h"
+#include "render/passes/bake.gpu.h"
+#include "render/passes/passes.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+
+namespace kiln::render {
+
+namespace {
+
+// Distances and materials together. Beyond it a field is refused, and the world coarsens.
+constexpr uint64_t kMaxAtlasBytes = 512ull << 20;
+// One slice of a bake: bounds the copy path's buffer (8 MiB) and the work of one submit.
+constexpr uint32_t kJobsPerSlice = 8192;
+constexpr uint64_t kCompareBlock = 64 << 10;
+
+template <typename T>
+std::span<const std::byte> bytes_of(const T& range) {
+    return std::as_bytes(std::span(range));
+}
+
+uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
+
+// Is all that the edit can change inside the grid? (An intersect takes away what is far from it.)
+bool stays_in(const sdf::EditSpan& edit, const Box3& grid) {
+    const Box3 b = edit.bounds.inflated(edit.reach);
+    return edit.op != Op::Intersect && grid.min.x <= b.min.x && grid.min.y <= b.min.y && grid.min.z <= b.min.z && b.max.x <= grid.max.x &&
+           b.max.y <= grid.max.y && b.max.z <= grid.max.z;
+}
+
+}  // namespace
+
+GpuField::GpuField(Runner& runner) : runner_(&runner), device_(&runner.device()) {}
+
+GpuField::~GpuField() {
+    drop_atlas();
+    for (Storage* s : {&cells_, &records_, &code_, &program_, &numbers_}) {
+        if (!s->handle) continue;
+        runner_->forget(s->handle);
+        device_->destroy(s->handle);
+    }
+    if (dropped_) {
+        runner_->forget(dropped_);
+        device_->destroy(dropped_);
+    }
+}
+
+// Makes the buffer hold at least `bytes`; `kept` says whether it is still the one it was.
+Result<void> GpuField::reserve(Storage& storage, std::string_view name, uint64_t bytes, bool& kept) {
+    const uint64_t most = std::min(device_->limits().max_storage_binding, device_->limits().max_buffer);
+    if (bytes > most) {
+        return Error{formatted("the field's {} need {} bytes, a buffer of this device holds {}; a larger voxel size would fit", name, bytes, most),
+                     ErrorKind::OutOfMemory};
+    }
+    kept = storage.bytes >= std::max<uint64_t>(bytes, 16);
+    if (kept) return {};
+    if (storage.handle) {
+        runner_->forget(storage.handle);
+        device_->destroy(storage.handle);
+    }
+    storage = {};
+    // Room to grow by half, so that a growing world does not make a buffer a frame.
+    const uint64_t room = std::min<uint64_t>((bytes + bytes / 2 + 256) & ~uint64_t{255}, most);
+    auto buffer = device_->create_buffer({.size = room, .label = name});
+    if (!buffer) return buffer.error();
+    storage = {*buffer, room};
+    return {};
+}
+
+// Writes `bytes`, leaving out blocks equal to `old` (what the buffer holds there).
+Result<void> GpuField::write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes, std::span<const std::byte> old) {
+    const auto same = [&](uint64_t at, uint64_t n) {
+        return at + n <= old.size() && std::memcmp(bytes.data() + at, old.data() + at, n) == 0;
+    };
+    for (uint64_t at = 0; at < bytes.size();) {
+        const uint64_t n = std::min<uint64_t>(kCompareBlock, bytes.size() - at);
+        if (same(at, n)) {
+            at += n;
+            continue;
+        }
+        uint64_t end = at + n;  // as long a run of changed blocks as there is, in one write
+        while (end < bytes.size()) {
+            const uint64_t m = std::min<uint64_t>(kCompareBlock, bytes.size() - end);
+            if (same(end, m)) break;
+            end += m;
+        }
+        if (auto written = device_->write_buffer(storage.handle, offset + at, bytes.subspan(at, end - at)); !written) return written;
+        at = end;
+    }
+    return {};
+}
+
+Result<void> GpuField::store(Storage& storage, std::string_view name, std::span<const std::byte> bytes,
+                             std::span<const std::byte> old) {
+    bool kept = false;
+    if (auto r = reserve(storage, name, bytes.size(), kept); !r) return r;
+    return write(storage, 0, bytes, kept ? old : std::span<const std::byte>{});
+}
+
+void GpuField::drop_atlas() {
+    for (rhi::TextureHandle* t : {&distances_, &materials_}) {
+        if (!*t) continue;
+        runner_->forget(*t);
+        device_->destroy(*t);
+        *t = {};
+    }
+    if (palettes_) {
+        runner_->forget(palettes_);
+        device_->destroy(palettes_);
+        palettes_ = {};
+    }
+}
+
+Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, bool storage) {
+    drop_atlas();
+    const uint32_t side = std::min(device_->limits().max_texture_3d, rhi::kMaxTexture3d) / field::kBrickTexels;
+    bricks_x_ = 32;  // a multiple of the bricks of a copy group, so that most copies are whole groups
+    uint32_t y_most = 32;
+    while (uint64_t{bricks_x_} * y_most * side < slots && y_most < side) y_most *= 2;
+    bricks_y_ = std::clamp(ceil_div(slots, bricks_x_), 1u, y_most);
+    bricks_z_ = std::max(ceil_div(slots, bricks_x_ * bricks_y_), 1u);
+    const uint64_t texels = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kBrickTexelCount;
+    const uint64_t bytes = texels * (rhi::bytes_per_texel(format) + 2);
+    if (bricks_z_ > side || bytes > kMaxAtlasBytes) {
+        return Error{formatted("the atlas of {} bricks needs {} bytes, at most {} are given to it; a larger voxel size would fit", slots, bytes,
+                               kMaxAtlasBytes),
+                     ErrorKind::OutOfMemory};
+    }
+    using rhi::TextureUsage;
+    const rhi::Extent size{bricks_x_ * 8, bricks_y_ * 8, bricks_z_ * 8};
+    auto distances = device_->create_texture(
+        {.dimension = rhi::Dimension::D3,
+         .format = format,
+         .size = size,
+         .usage = TextureUsage::Sampled | TextureUsage::CopySrc | (storage ? TextureUsage::Storage : TextureUsage::CopyDst),
+         .label = "atlas distances"});
+    if (!distances) return distances.error();
+    distances_ = *distances;
+    auto materials = device_->create_texture({.dimension = rhi::Dimension::D3,
+                                              .format = rhi::Format::R32Uint,
+                                              .size = {size.width / 2, size.height, size.depth},
+                                              .usage = TextureUsage::Sampled | TextureUsage::Storage | TextureUsage::CopySrc,
+                                              .label = "atlas materials"});
+    if (!materials) return materials.error();
+    materials_ = *materials;
+    auto palettes = device_->create_buffer(
+        {.size = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kPaletteSize * 4, .label = "palettes"});
+    if (!palettes) return palettes.error();
+    palettes_ = *palettes;
+    format_ = format;
+    storage_ = storage;
+    return {};
+}
+
+// Edits that reach out of the grid, as one program; nothing when none does or the world is empty there.
+std::vector<sdf::Instruction> GpuField::outside_code() const {
+    const sdf::Program& program = field_->program();
+    const field::GridParams g = field_->grid();
+    const float cell = g.voxel_size * float(field::kBrickVoxels);
+    const Box3 grid{{float(g.cell_x) * cell, float(g.cell_y) * cell, float(g.cell_z) * cell},
+                    {float(g.cell_x + g.size_x) * cell, float(g.cell_y + g.size_y) * cell, float(g.cell_z + g.size_z) * cell}};
+    std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
+    bool adds = false;
+    for (const sdf::EditSpan& edit : program.edits) {
+        if (edit.count == 0 || stays_in(edit, grid)) continue;
+        adds = adds || edit.op == Op::Union;
+        out.insert(out.end(), program.code.begin() + edit.first, program.code.begin() + edit.first + edit.count);
+    }
+    if (!adds) out.clear();
+    return out;
+}
+
+Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_copy) {
+    KILN_ASSERT(next != nullptr);
+    bricks_baked_ = 0;
+    bake_ms_ = 0;
+    const rhi::Format format =
+        next->options().format == field::DistanceFormat::Half ? rhi::Format::R16Float : rhi::Format::R8Snorm;
+    const bool storage = !by_copy && device_->caps().storage_r16f;
+    const bool same_atlas = distances_ && format == format_ && storage == storage_ &&
+                            next->slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
+    const bool here = field_ && same_atlas && next->revision() == field_->revision();
+    if (here) return {};
+    const bool grown_from_here = field_ && same_atlas && next->parent_revision() == field_->revision();
+
+    const std::shared_ptr<const field::Field> old = std::move(field_);
+    field_ = next;
+    auto fail = [this](Error error) -> Result<void> {
+        field_.reset();  // what the buffers hold is not known any more
+        return error;
+    };
+    auto old_bytes = [&old](auto member) { return old ? bytes_of(member(*old)) : std::span<const std::byte>{}; };
+    const auto cells = [](const field::Field& f) { return f.cells(); };
+    const auto records = [](const field::Field& f) { return f.records(); };
+    const auto code = [](const field::Field& f) { return f.code(); };
+    std::vector<sdf::Instruction> programs = next->program().code;
+    program_count_ = uint32_t(programs.size());
+    const std::vector<sdf::Instruction> outside = outside_code();
+    outside_count_ = uint32_t(outside.size());
+    programs.insert(programs.end(), outside.begin(), outside.end());
+
+    if (auto r = store(cells_, "cells", bytes_of(next->cells()), old_bytes(cells)); !r) return fail(r.error());
+    if (auto r = store(records_, "records", bytes_of(next->records()), old_bytes(records)); !r) return fail(r.error());
+    if (auto r = store(code_, "code", bytes_of(next->code()), old_bytes(code)); !r) return fail(r.error());
+    if (auto r = store(program_, "program", bytes_of(programs), bytes_of(program_code_)); !r) return fail(r.error());
+    program_code_ = std::move(programs);
+    const std::vector<float>& new_samples = next->program().samples;
+    const std::vector<float>& new_params = next->program().params;
+    bool kept = false;
+    if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r) return fail(r.error());
+    kept = kept && old && old->program().samples.size() == new_samples.size();
+    const uint64_t params_at = new_samples.size() * sizeof(float);
+    const std::span<const std::byte> nothing;
+    if (auto r = write(numbers_, 0, bytes_of(new_samples), kept ? bytes_of(old->program().samples) : nothing); !r) return fail(r.error());
+    if (auto r = write(numbers_, params_at, bytes_of(new_params), kept ? bytes_of(old->program().params) : nothing); !r)
+        return fail(r.error());
+    if (!dropped_) {
+        auto buffer = device_->create_buffer({.size = 16, .label = "dropped materials"});
+        if (!buffer) return fail(buffer.error());
+        dropped_ = *buffer;
+        const std::array<uint32_t, 4> zeros{};
+        if (auto r = device_->write_buffer(dropped_, 0, bytes_of(zeros)); !r) return fail(r.error());
+    }
+    if (!same_atlas) {
+        // A growing world gets half as much again, where that fits.
+        const uint32_t wanted = next->slot_count();
+        const uint32_t roomy = distances_ ? wanted + wanted / 2 : wanted;
+        auto made = make_atlas(std::max(roomy, 1u), format, storage);
+        if (!made && roomy != wanted) made = make_atlas(std::max(wanted, 1u), format, storage);
+        if (!made) {
+            drop_atlas();
+            return fail(made.error());
+        }
+    }
+
+    std::vector<uint32_t> slots;
+    if (grown_from_here) {
+        for (const field::BrickJob& job : next->jobs()) slots.push_back(job.slot);
+    } else {
+        for (uint32_t slot = 0; slot < next->slot_count(); ++slot) {
+            if (next->records()[slot].code_count != 0) slots.push_back(slot);
+        }
+    }
+    std::sort(slots.begin(), slots.end());
+    if (auto r = bake(slots, !storage); !r) return fail(r.error());
+    return {};
+}
+
+Result<void> GpuField::bake(std::span<const uint32_t> slots, bool by_copy) {
+    bricks_baked_ = uint32_t(slots.size());
+    for (size_t at = 0; at < slots.size(); at += kJobsPerSlice) {
+        const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
+        Graph graph(*runner_);
+        FieldHandles f = import(graph);
+        BakePush push{};
+        push.voxel_size = field_->grid().voxel_size;
+        push.voxels_per_metre = 1.0f / push.voxel_size;
+        push.params_first = params_first();
+        push.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
+        bake_bricks(graph, f, slice, push, format_, by_copy);
+        graph.output(f.distances, rhi::Access::SampledReadCompute);
+        graph.output(f.materials, rhi::Access::SampledReadCompute);
+        graph.output(f.palettes, rhi::Access::StorageReadCompute);
+        graph.output(f.dropped);
+        auto submit = runner_->execute(graph);
+        if (!submit) return submit.error();
+        if (device_->caps().timestamp) {
+            auto times = runner_->times(*submit);
+            if (!times) return times.error();
+            bake_ms_ += times->total_ms;
+        }
+    }
+    return {};
+}
+
+FieldHandles GpuField::import(Graph& graph) const {
+    FieldHandles f;
+    f.cells = graph.import("cells", cells_.handle);
+    f.records = graph.import("records", records_.handle);
+    f.code = graph.import("code", code_.handle);
+    f.program = graph.import("program", program_.handle);
+    f.numbers = graph.import("numbers", numbers_.handle);
+    f.palettes = graph.import("palettes", palettes_);
+    f.dropped = graph.import("dropped materials", dropped_);
+    f.distances = graph.import("atlas distances", distances_);
+    f.materials = graph.import("atlas materials", materials_);
+    return f;
+}
+
+field::GridParams GpuField::grid() const {
+    field::GridParams g = field_->grid();
+    g.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
+    return g;
+}
+
+float GpuField::distance_scale() const { return format_ == rhi::Format::R8Snorm ? field::kBandVoxels : 1.0f; }
+
+uint32_t GpuField::params_first() const { return uint32_t(field_->program().samples.size()); }
+
+uint32_t GpuField::outside_first() const { return program_count_; }
+
+uint64_t GpuField::atlas_bytes() const {
+    return uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kBrickTexelCount * (rhi::bytes_per_texel(format_) + 2);
+}
+
+Result<uint32_t> GpuField::dropped_materials() {
+    Graph graph(*runner_);
+    const Readback back = graph.readback(import(graph).dropped);
+    if (auto submit = runner_->execute(graph); !submit) return submit.error();
+    auto words = back.get_as<uint32_t>();
+    if (!words) return words.error();
+    return words->front();
+}
+
+Result<std::vector<GpuField::BrickTexels>> GpuField::read_back(std::span<const uint32_t> slots) {
+    Graph graph(*runner_);
+    FieldHandles f = import(graph);
+    const Readback distances = graph.readback(f.distances);
+    const Readback materials = graph.readback(f.materials);
+    const Readback palettes = graph.readback(f.palettes);
+    if (auto submit = runner_->execute(graph); !submit) return submit.error();
+    auto codes = distances.get();
+    if (!codes) return codes.error();
+    auto words = materials.get_as<uint32_t>();
+    if (!words) return words.error();
+    auto ids = palettes.get_as<uint32_t>();
+    if (!ids) return ids.error();
+    const uint32_t code_bytes = rhi::bytes_per_texel(format_);
+    const size_t row = size_t{bricks_x_} * 8;
+    const size_t plane = row * bricks_y_ * 8;
+    std::vector<BrickTexels> out;
+    for (const uint32_t slot : slots) {
+        BrickTexels brick;
+        const size_t bx = slot % bricks_x_;
+        const size_t by = slot / bricks_x_ % bricks_y_;
+        const size_t bz = slot / (bricks_x_ * bricks_y_);
+        for (size_t z = 0; z < 8; ++z) {
+            for (size_t y = 0; y < 8; ++y) {
+                for (size_t x = 0; x < 8; ++x) {
+                    const size_t at = (bz * 8 + z) * plane + (by * 8 + y) * row + bx * 8 + x;
+                    uint32_t code = 0;
+                    std::memcpy(&code, codes->data() + at * code_bytes, code_bytes);
+                    brick.distance_codes.push_back(code);
+                    const uint32_t two = (*words)[at / 2];
+                    brick.material_words.push_back(at % 2 == 0 ? two & 0xffffu : two >> 16);
+                }
+            }
+        }
+        const auto first = ids->begin() + ptrdiff_t(slot) * field::kPaletteSize;
+        brick.palette.assign(first, first + field::kPaletteSize);
+        out.push_back(std::move(brick));
+    }
+    return out;
+}
+
+}  // namespace kiln::render

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// A field on the GPU: brick map, records, code, and the atlas of distances and materials that the bake fills.
+// Kept between frames: a field whose parent is the one already here costs only what changed. Owner's thread.
+#pragma once
+
+#include "field/field.h"
+#include "render/graph.h"
+#include "rhi/device.h"
+
+#include <memory>
+
+namespace kiln::render {
+
+// The field's resources as one graph sees them.
+struct FieldHandles {
+    Buffer cells, records, code, program, palettes, dropped;
+    Buffer numbers;  // Program::samples, then Program::params
+    Image distances, materials;
+};
+
+class GpuField {
+public:
+    explicit GpuField(Runner& runner);
+    ~GpuField();
+    GpuField(const GpuField&) = delete;
+    GpuField& operator=(const GpuField&) = delete;
+
+    // Makes the GPU's copy that of `field`: uploads, bakes, and waits for nothing. `by_copy`: distances go through a buffer
+    // even where the device could store them directly. OutOfMemory, with the number of bytes, when the atlas does not fit.
+    Result<void> update(std::shared_ptr<const field::Field> field, bool by_copy);
+
+    FieldHandles import(Graph& graph) const;
+
+    const field::Field* field() const { return field_.get(); }
+    field::GridParams grid() const;                     // with the atlas layout filled in
+    float distance_scale() const;                  // voxels a unit of the atlas
+    bool leaves_grid() const { return outside_count_ != 0; }
+    uint32_t params_first() const;                 // in the numbers buffer
+    uint32_t outside_first() const;                // in the program buffer
+    uint32_t outside_count() const { return outside_count_; }
+    uint32_t program_count() const { return program_count_; }
+    uint64_t atlas_bytes() const;
+    uint32_t bricks_baked() const { return bricks_baked_; }  // by the last update()
+    double bake_ms() const { return bake_ms_; }              // GPU time of the last update(); 0 when nothing was baked
+    Result<uint32_t> dropped_materials();                    // that found no place in a palette of 16, so far; waits
+
+    // What is stored, for tests: distance codes (16 or 8 bits each) and material words of a brick, in order x, y, z.
+    struct BrickTexels {
+        std::vector<uint32_t> distance_codes, material_words;  // 512 each
+        std::vector<uint32_t> palette;                         // 16
+    };
+    Result<std::vector<BrickTexels>> read_back(std::span<const uint32_t> slots);
+
+private:
+    struct Storage {
+        rhi::BufferHandle handle;
+        uint64_t bytes = 0;
+    };
+    Result<void> reserve(Storage& storage, std::string_view name, uint64_t bytes, bool& kept);
+    Result<void> write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes, std::span<const std::byte> old);
+    Result<void> store(Storage& storage, std::string_view name, std::span<const std::byte> bytes, std::span<const std::byte> old);
+    Result<void> make_atlas(uint32_t slots, rhi::Format format, bool storage);
+    void drop_atlas();
+    Result<void> bake(std::span<const uint32_t> slots, bool by_copy);
+    std::vector<sdf::Instruction> outside_code() const;
+
+    Runner* runner_;
+    rhi::Device* device_;
+    std::shared_ptr<const field::Field> field_;
+    Storage cells_, records_, code_, program_, numbers_;
+    std::vector<sdf::Instruction> program_code_;
+    rhi::BufferHandle palettes_, dropped_;
+    rhi::TextureHandle distances_, materials_;
+    rhi::Format format_ = rhi::Format::Undefined;
+    bool storage_ = false;  // the atlas of distances is a storage texture
+    uint32_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;
+    uint32_t outside_count_ = 0, program_count_ = 0;
+    uint32_t bricks_baked_ = 0;
+    double bake_ms_ = 0;
+};
+
+}  // namespace kiln::render

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: MIT
+// The baked field in kernels: what field/march.gpu.h and field/surface.gpu.h ask for. The including kernel declares first:
+//   FrameParams frame, uint cells[] (the brick map), texture3D distances (the atlas);
+//   for KILN_FIELD_SURFACE also utexture3D materials (two texels a word, along x).
+
+#include "field/codes.gpu.h"
+#include "field/cubic.gpu.h"
+
+#include "render/passes/map.glsl"
+
+// Texel (0, 0, 0) of a slot in the atlas.
+ivec3 atlas_corner(int slot) {
+    int bricks_x = int(frame.grid.atlas_bricks_x_y & 0xffffu);
+    int bricks_y = int(frame.grid.atlas_bricks_x_y >> 16u);
+    return ivec3(slot % bricks_x, (slot / bricks_x) % bricks_y, slot / (bricks_x * bricks_y)) * kBrickTexels;
+}
+
+float field_texel(int slot, ivec3 texel) { return texelFetch(distances, atlas_corner(slot) + texel, 0).r * frame.distance_scale; }
+
+Corners field_corners(int slot, ivec3 voxel) {
+    ivec3 at = atlas_corner(slot) + voxel;
+    float scale = frame.distance_scale;
+    Corners c;
+    c.v000 = texelFetch(distances, at, 0).r * scale;
+    c.v100 = texelFetch(distances, at + ivec3(1, 0, 0), 0).r * scale;
+    c.v010 = texelFetch(distances, at + ivec3(0, 1, 0), 0).r * scale;
+    c.v110 = texelFetch(distances, at + ivec3(1, 1, 0), 0).r * scale;
+    c.v001 = texelFetch(distances, at + ivec3(0, 0, 1), 0).r * scale;
+    c.v101 = texelFetch(distances, at + ivec3(1, 0, 1), 0).r * scale;
+    c.v011 = texelFetch(distances, at + ivec3(0, 1, 1), 0).r * scale;
+    c.v111 = texelFetch(distances, at + ivec3(1, 1, 1), 0).r * scale;
+    return c;
+}
+
+#include "field/march.gpu.h"
+
+#ifdef KILN_FIELD_SURFACE
+// Brick of a world cell, -1 where there is none.
+int field_slot(ivec3 cell) {
+    ivec3 c = cell - grid_first_cell();
+    if (!in_grid(c)) return -1;
+    uint word = field_cell(c);
+    return (word & kCellOccupied) != 0u ? int(word & kCellSlotMask) : -1;
+}
+
+uint field_material(int slot, ivec3 texel) {
+    ivec3 at = atlas_corner(slot) + texel;
+    uint two = texelFetch(materials, ivec3(at.x >> 1, at.y, at.z), 0).r;
+    return (at.x & 1) == 0 ? two & 0xffffu : two >> 16u;
+}
+
+#include "field/surface.gpu.h"
+#endif

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: MIT
+// What every kernel of a frame knows: camera, grid, tile, and where the exact programs are. Also the records of lights and
+// materials, and the visibility word that march writes and resolve reads.
+
+#ifdef __cplusplus
+#pragma once
+#endif
+#include "field/brick.gpu.h"
+#include "render/lib/camera.gpu.h"
+#include "render/lib/sky.gpu.h"
+#ifdef __cplusplus
+namespace kiln::render {
+using field::GridParams;
+using shade::CameraParams;
+using shade::SkyParams;
+using uint = uint32_t;
+#endif
+
+KILN_CONST int kTileGroup = 8;  // a workgroup of the picture's kernels is 8 x 8 pixels
+
+struct FrameParams {
+    GridParams grid;
+    int eye_x, eye_y, eye_z;                   // the camera: voxel it is in
+    float distance_scale;                      // voxels a unit of the atlas
+    float eye_part_x, eye_part_y, eye_part_z;  // and where in it, [0, 1)
+    float pixel_angle;                         // radians between neighbouring pixels at the middle of the picture
+    CameraParams camera;
+    int width, height;                         // pixels of the whole picture
+    int tile_x, tile_y;                        // of this tile's first pixel
+    int tile_width, tile_height;
+    uint flags;                                // kFrame…
+    uint light_count;
+    uint outside_first, outside_count;         // code of what leaves the grid, in the program buffer; count 0: nothing does
+    uint program_count;                        // code of the whole program, from the program buffer's start
+    uint params_first;                         // of Program::params in the numbers buffer
+    SkyParams sky;
+    float exposure;
+    uint tone_map;                             // kiln::ToneMap
+    uint view;                                 // kiln::View
+    uint material_count;
+};
+
+KILN_CONST uint kFrameAccelerate = 1u;  // jump over empty cells
+KILN_CONST uint kFrameRays = 2u;        // rays come from the rays buffer instead of the camera
+KILN_CONST uint kFrameAnalytic = 4u;    // march the pruned programs of the cells
+KILN_CONST uint kFrameUnpruned = 8u;    // march the whole program
+
+// A ray given from outside (tests, queries): origin in voxels, unit direction.
+struct FrameRay {
+    int whole_x, whole_y, whole_z;
+    float pad_0;
+    float part_x, part_y, part_z;
+    float pad_1;
+    float direction_x, direction_y, direction_z;
+    float pad_2;
+};
+
+struct MaterialRecord {
+    float base_red, base_green, base_blue;  // linear
+    float roughness;
+    float emissive_red, emissive_green, emissive_blue;
+    float metallic;
+};
+
+// Visibility of a pixel, four words: t in voxels along the ray (bits of a float); state << 28 | slot;
+// voxel x | y << 3 | z << 6; steps | evaluations << 16 (each at most 65535).
+KILN_CONST uint kSeenNothing = 0u;
+KILN_CONST uint kSeenBrick = 1u;    // the trilinear surface in a brick
+KILN_CONST uint kSeenInside = 2u;   // solid without a brick: the camera is in it
+KILN_CONST uint kSeenPruned = 3u;   // exact code of brick `slot`
+KILN_CONST uint kSeenOutside = 4u;  // exact code of what leaves the grid
+KILN_CONST uint kSeenProgram = 5u;  // exact code of the whole program
+
+#ifdef __cplusplus
+static_assert(sizeof(FrameParams) == 256 && sizeof(FrameRay) == 48 && sizeof(MaterialRecord) == 32);
+}  // namespace kiln::render
+#endif

@@ -1,0 +1,54 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// Light leaving each visible point towards the eye: what it emits and reflects of the sky, and of up to four lights; where nothing
+// is, the sky. Later batches of lights add to the radiance of the ones before.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#include "render/passes/shadow.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights[]; };
+layout(set = 0, binding = 3, std430) readonly buffer GgxTable { uint ggx_table[]; };
+layout(set = 0, binding = 4) uniform utexture2D visibility;
+layout(set = 0, binding = 5) uniform utexture2D surface_words;
+layout(set = 0, binding = 6) uniform texture2D visible_fractions;
+layout(set = 0, binding = 7) uniform texture2D radiance_before;  // of earlier batches; not read by the first
+layout(set = 0, binding = 8, rgba16f) writeonly uniform image2D radiance;
+layout(push_constant) uniform Push { ShadowPush push; };
+
+uint ggx_table_word(uint i) { return ggx_table[i]; }
+#include "render/lib/shading.gpu.h"
+#include "render/passes/rays.glsl"
+#include "render/passes/surface.glsl"
+
+const float kBrightestStored = 65000.0;  // of a half
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    TexelRay ray = pixel_ray(pixel);
+    uvec4 seen = texelFetch(visibility, pixel, 0);
+    bool first = push.first_light == 0u;
+    vec3 sum = vec3(0.0);
+    if (!first) sum = texelFetch(radiance_before, pixel, 0).rgb;
+    if ((seen.y >> 28u) == kSeenNothing) {
+        if (first) sum = sky_radiance(frame.sky, ray.direction);
+        imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 0.0));
+        return;
+    }
+    SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
+    SurfaceView view = surface_view(surface_optics(surface.albedo, surface.metallic, surface.roughness), surface.normal, -ray.direction);
+    if (first) sum = surface.emissive + surface.ambient * shade_sky(view, frame.sky);
+    vec4 fractions = texelFetch(visible_fractions, pixel, 0);
+    vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * frame.grid.voxel_size;
+    for (uint i = 0u; i < kLightsAtOnce; ++i) {
+        if (push.first_light + i >= frame.light_count) break;
+        float fraction = fractions[i];
+        if (fraction > 0.0) sum += shade_light(view, sample_light(lights[push.first_light + i], p_world), fraction);
+    }
+    imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 1.0));
+}

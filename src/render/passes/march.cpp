@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/passes.h"
+
+#include "shaders/march.spv.h"
+#include "shaders/march_exact.spv.h"
+
+namespace kiln::render {
+
+const Kernel kMarch{"march", kMarchSpv};
+const Kernel kMarchExact{"march exact", kMarchExactSpv};
+
+Visibility march(Graph& g, const TileInputs& in) {
+    Visibility out;
+    const uint32_t groups = ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
+    const FieldHandles& f = in.field;
+    Image words = g.create("visibility", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    if (in.analytic) {
+        g.clear(words);
+    } else {
+        Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
+        g.dispatch(kMarch, in.size,
+                   {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words), g.write(counted)});
+        out.evaluations.push_back(counted);
+    }
+    if (in.exact) {
+        Image both = g.create("visibility exact", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+        Buffer counted = g.create_buffer("march exact evaluations", uint64_t{groups} * 4);
+        g.dispatch(kMarchExact, in.size,
+                   {g.uniform(in.frame), g.read(f.cells), g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers),
+                    g.read(in.rays), g.read(words), g.write(both), g.write(counted)});
+        out.evaluations.push_back(counted);
+        words = both;
+    }
+    out.words = words;
+    return out;
+}
+
+}  // namespace kiln::render

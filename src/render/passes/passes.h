@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+// The passes of a frame, each a function of images, each in the file of its name. Kernels are named here for warm-up.
+#pragma once
+
+#include "render/gpu_field.h"
+#include "render/graph.h"
+#include "render/passes/bake.gpu.h"
+#include "render/passes/frame.gpu.h"
+#include "render/passes/shadow.gpu.h"
+
+#include <vector>
+
+namespace kiln::render {
+
+extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
+extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kLight, kTonemap, kView;
+
+// Bakes `slots` (at most a slice) into the field's atlas.
+void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy);
+
+// What every pass of one tile reads.
+struct TileInputs {
+    FieldHandles field;
+    Block frame;             // FrameParams
+    Buffer rays;             // FrameRay a pixel; a dummy unless kFrameRays
+    Buffer materials;        // MaterialRecord
+    Buffer lights;           // LightRecord
+    Buffer ggx_table;
+    uint32_t light_count = 0;
+    rhi::Extent size;        // of the tile
+    bool exact = false;      // some code is marched: analytic, or edits leave the grid
+    bool analytic = false;   // … instead of the bricks
+};
+
+// Visibility words, and the evaluations of each workgroup of each march.
+struct Visibility {
+    Image words;
+    std::vector<Buffer> evaluations;
+};
+Visibility march(Graph& g, const TileInputs& in);
+
+struct Surface {
+    Image words;  // packed G-buffer, see surface.glsl
+    Image depth;  // metres along the ray, +infinity where nothing is hit
+};
+Surface resolve(Graph& g, const TileInputs& in, const Image& visibility);
+
+// Visible fractions of the discs of lights push.first_light … + 3, a channel each.
+Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);
+// Scene-linear radiance, before exposure.
+Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+// Exposed, tone-mapped, sRGB-encoded.
+Image tonemap(Graph& g, const TileInputs& in, const Image& radiance);
+
+// A debug view: its numbers, and its bytes as they are shown.
+struct Shown {
+    Image values, bytes;
+};
+Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+
+}  // namespace kiln::render

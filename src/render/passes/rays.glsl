@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// The ray of a pixel of this tile. The including kernel declares first: FrameParams frame, FrameRay rays[].
+
+#include "field/cubic.gpu.h"
+
+vec3 camera_direction(ivec2 pixel) {
+    return camera_direction_at(frame.camera, float(pixel.x) + 0.5, float(pixel.y) + 0.5);
+}
+
+TexelRay pixel_ray(ivec2 pixel) {
+    if ((frame.flags & kFrameRays) != 0u) {
+        FrameRay r = rays[pixel.y * frame.tile_width + pixel.x];
+        return texel_ray(ivec3(r.whole_x, r.whole_y, r.whole_z), vec3(r.part_x, r.part_y, r.part_z),
+                         vec3(r.direction_x, r.direction_y, r.direction_z));
+    }
+    return texel_ray(ivec3(frame.eye_x, frame.eye_y, frame.eye_z), vec3(frame.eye_part_x, frame.eye_part_y, frame.eye_part_z),
+                     camera_direction(pixel + ivec2(frame.tile_x, frame.tile_y)));
+}

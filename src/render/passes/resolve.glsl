@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: MIT
+// What each visible point looks like: normal, material, depth; once per pixel. With KILN_EXACT also points found on exact code.
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Records { BrickRecord records[]; };
+layout(set = 0, binding = 3, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Palettes { uint palettes[]; };
+layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialRecord material_table[]; };
+layout(set = 0, binding = 6) uniform texture3D distances;
+layout(set = 0, binding = 7) uniform utexture3D materials;
+layout(set = 0, binding = 8) uniform utexture2D visibility;
+layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D surface_words;
+layout(set = 0, binding = 10, r32f) writeonly uniform image2D depth;  // metres along the ray
+#ifdef KILN_EXACT
+layout(set = 0, binding = 11, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 12, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 13, std430) readonly buffer Numbers { float numbers[]; };
+#endif
+
+#define KILN_FIELD_SURFACE
+#include "render/passes/field.glsl"
+#include "render/passes/rays.glsl"
+#include "render/passes/surface.glsl"
+#ifdef KILN_EXACT
+#define KILN_TAPE_MATERIALS
+#include "render/passes/tape_buffers.glsl"
+#include "render/passes/code_of.glsl"
+#endif
+
+MaterialRecord material_of(uint number) {
+    return material_table[number < frame.material_count ? number : 0u];
+}
+
+void add_material(inout SurfaceSample s, uint number, float weight) {
+    MaterialRecord m = material_of(number);
+    s.albedo += weight * vec3(m.base_red, m.base_green, m.base_blue);
+    s.emissive += weight * vec3(m.emissive_red, m.emissive_green, m.emissive_blue);
+    s.roughness += weight * m.roughness;
+    s.metallic += weight * m.metallic;
+}
+
+vec3 unit_or(vec3 v, vec3 other) {
+    float size = length(v);
+    return size > 1e-20 ? v / size : other;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    uvec4 seen = texelFetch(visibility, pixel, 0);
+    uint state = seen.y >> 28u;
+    int slot = int(seen.y & 0x0fffffffu);
+    float t = uintBitsToFloat(seen.x);
+    if (state == kSeenNothing) {
+        imageStore(surface_words, pixel, uvec4(0u));
+        imageStore(depth, pixel, vec4(uintBitsToFloat(0x7f800000u)));
+        return;
+    }
+    TexelRay ray = pixel_ray(pixel);
+    SurfaceSample s = SurfaceSample(vec3(0.0), -ray.direction, 0.0, 0.0, 1.0, kSurfaceHit, vec3(0.0));
+    if (state == kSeenBrick) {
+        BrickRecord record = records[slot];
+        ivec3 texel = ivec3(record.texel_x, record.texel_y, record.texel_z);
+        ivec3 voxel = ivec3(seen.z & 7u, (seen.z >> 3u) & 7u, (seen.z >> 6u) & 7u);
+        BrickRay local = brick_ray(ray, texel);
+        vec3 p = voxel_point(local, voxel, t - local.t_base);
+        s.normal = unit_or(dual_gradient(slot, texel / kBrickVoxels, vec3(voxel) + p), -ray.direction);
+        SurfaceMaterial mixed = surface_material(slot, voxel, p);
+        add_material(s, palettes[slot * kPaletteSize + int(mixed.slot0)], 1.0 - mixed.share);
+        if (mixed.share > 0.0) add_material(s, palettes[slot * kPaletteSize + int(mixed.slot1)], mixed.share);
+#ifdef KILN_EXACT
+    } else if (state != kSeenInside) {
+        uvec2 here_code = code_of(state, slot);
+        float h = frame.grid.voxel_size;
+        vec3 p_world = (vec3(ray.whole) + ray.part) * h + ray.direction * (t * h);
+        // Central differences: a tenth of a voxel, but never so little that the position's own rounding shows.
+        vec3 size = abs(p_world);
+        float step = max(0.1 * h, 3e-4 * max(max(size.x, size.y), size.z));
+        if (state == kSeenOutside) step = max(step, 0.25 * frame.pixel_angle * t * h);
+        vec3 gradient = vec3(0.0);
+        Mix mixed = make_mix(0.0, float(kNoMaterial), 0.0);
+        for (int i = 0; i < 7; ++i) {
+            vec3 away = vec3(0.0);
+            if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
+            Mix here;
+            float d = tape_materials(here_code.x, here_code.y, p_world + away, here);
+            if (i == 0) {
+                mixed = here;
+            } else {
+                gradient[(i - 1) >> 1] += (i & 1) == 1 ? d : -d;
+            }
+        }
+        s.normal = unit_or(gradient, -ray.direction);
+        add_material(s, uint(mixed.id0), 1.0 - mixed.share);
+        if (mixed.share > 0.0) add_material(s, uint(mixed.id1), mixed.share);
+#endif
+    } else {
+        add_material(s, 0u, 1.0);
+    }
+    imageStore(surface_words, pixel, pack_surface(s));
+    imageStore(depth, pixel, vec4(t * frame.grid.voxel_size));
+}

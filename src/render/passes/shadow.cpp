@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/passes.h"
+
+#include "shaders/shadow.spv.h"
+#include "shaders/shadow_exact.spv.h"
+
+namespace kiln::render {
+
+const Kernel kShadow{"shadow", kShadowSpv};
+const Kernel kShadowExact{"shadow exact", kShadowExactSpv};
+
+Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push) {
+    Image fractions = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
+    const FieldHandles& f = in.field;
+    std::vector<Use> uses{g.uniform(in.frame),    g.read(f.cells),    g.read(in.rays),       g.read(in.lights),
+                          g.sampled(f.distances), g.read(visibility), g.read(surface.words), g.write(fractions)};
+    if (in.exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
+    g.dispatch(in.exact ? kShadowExact : kShadow, in.size, uses, push);
+    return fractions;
+}
+
+}  // namespace kiln::render

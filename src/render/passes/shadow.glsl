@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: MIT
+// How much of each light's disc a point sees: four lights at a time, a channel each. Rays start one voxel off the surface and sample
+// the bricks (a trilinear value less kTrilinearErrorVoxels is what a step may trust); with KILN_EXACT, exact programs where they apply.
+
+#include "render/passes/shadow.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 3, std430) readonly buffer Lights { LightRecord lights[]; };
+layout(set = 0, binding = 4) uniform texture3D distances;
+layout(set = 0, binding = 5) uniform sampler distance_sampler;
+layout(set = 0, binding = 6) uniform utexture2D visibility;
+layout(set = 0, binding = 7) uniform utexture2D surface_words;
+layout(set = 0, binding = 8, rgba8) writeonly uniform image2D visible_fractions;
+#ifdef KILN_EXACT
+layout(set = 0, binding = 9, std430) readonly buffer Records { BrickRecord records[]; };
+layout(set = 0, binding = 10, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 11, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 12, std430) readonly buffer Numbers { float numbers[]; };
+#endif
+layout(push_constant) uniform Push { ShadowPush push; };
+
+#include "render/passes/map.glsl"
+#include "render/passes/rays.glsl"
+#include "render/passes/surface.glsl"
+#include "render/passes/grid_stretch.glsl"
+#ifdef KILN_EXACT
+#include "render/passes/tape_buffers.glsl"
+#include "render/passes/code_of.glsl"
+#endif
+
+const int kShadowSteps = 384;
+const float kSaturatedVoxels = 3.95;  // stored distances from here on only say "far"
+const float kFarAway = 1e4;
+const float kClearOfEmptyCell = 0.13;  // texels of an empty cell are a voxel or more from the surface, its points 1 - sqrt(3)/2
+
+// Trilinear distance, voxels, at a point of a brick counted from its texel (0, 0, 0).
+float sampled_distance(int slot, vec3 local) {
+    int bricks_x = int(frame.grid.atlas_bricks_x_y & 0xffffu);
+    int bricks_y = int(frame.grid.atlas_bricks_x_y >> 16u);
+    vec3 corner = vec3(ivec3(slot % bricks_x, (slot / bricks_x) % bricks_y, slot / (bricks_x * bricks_y)) * kBrickTexels);
+    vec3 at = (corner + clamp(local, vec3(0.0), vec3(float(kBrickVoxels))) + 0.5) / vec3(textureSize(sampler3D(distances, distance_sampler), 0));
+    return textureLod(sampler3D(distances, distance_sampler), at, 0.0).r * frame.distance_scale;
+}
+
+// Positions of shadow rays count from here: the voxel their point is in.
+ivec3 shadow_whole;
+
+// Distance of a point from the grid's box, 0 inside; `local` counts from the grid's first texel.
+float grid_gap(vec3 local) {
+    vec3 size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
+    return length(max(max(-local, local - size), vec3(0.0)));
+}
+
+// For soft_shadow.gpu.h, in voxels.
+vec2 shadow_field(vec3 p) {
+    ivec3 whole = shadow_whole - grid_first_cell() * kBrickVoxels;
+    vec3 local = vec3(whole) + p;
+    ivec3 cell = ivec3(floor(local / float(kBrickVoxels)));
+    bool inside_grid = in_grid(cell);
+    uint word = inside_grid ? field_cell(cell) : 0u;
+    bool occupied = (word & kCellOccupied) != 0u;
+    int slot = int(word & kCellSlotMask);
+#ifdef KILN_EXACT
+    bool unpruned = (frame.flags & kFrameUnpruned) != 0u;
+    uint state = unpruned ? kSeenProgram : (inside_grid ? kSeenPruned : kSeenOutside);
+    bool by_code = unpruned || (inside_grid ? occupied && (frame.flags & kFrameAnalytic) != 0u : frame.outside_count != 0u);
+    if (by_code) {
+        uvec2 here_code = code_of(state, slot);
+        float d = tape_distance(here_code.x, here_code.y, (vec3(shadow_whole) + p) * frame.grid.voxel_size) / frame.grid.voxel_size;
+        // Outside the grid the code says nothing of what is inside.
+        float step = state == kSeenOutside ? min(abs(d), grid_gap(local) + 0.25) : abs(d);
+        return vec2(d, max(step, 1e-3));
+    }
+#endif
+    if (!inside_grid) return vec2(kFarAway, grid_gap(local) + 0.25);
+    vec3 in_cell = local - vec3(cell * kBrickVoxels);
+    if (occupied) {
+        float d = sampled_distance(slot, in_cell);
+        return vec2(d >= kSaturatedVoxels ? kFarAway : d, max(abs(d) - kTrilinearErrorVoxels, 0.01));
+    }
+    if ((word & kCellInside) != 0u) return vec2(-kFarAway, 1.0);
+    // To the nearest face of the cube of cells that are empty.
+    vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
+    float rim = min(min(to_face.x, to_face.y), to_face.z) + float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
+    return vec2(kFarAway, max(rim, 0.0) + kClearOfEmptyCell);
+}
+
+#include "render/lib/soft_shadow.gpu.h"
+
+// Wide discs are cut into parts, so that each part's cone stays in the band that bricks store.
+int disc_parts(float tan_radius) { return tan_radius < 0.02 ? 1 : (tan_radius < 0.1 ? 4 : 16); }
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    uvec4 seen = texelFetch(visibility, pixel, 0);
+    vec4 fractions = vec4(0.0);
+    uint state = seen.y >> 28u;
+    if (state != kSeenNothing && state != kSeenInside) {
+        SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
+        TexelRay ray = pixel_ray(pixel);
+        float t = uintBitsToFloat(seen.x);
+        float h = frame.grid.voxel_size;
+        // One voxel off the surface; a pixel, where pixels are larger than voxels.
+        float off = max(1.0, 1.5 * frame.pixel_angle * t);
+        vec3 from = ray.part + ray.direction * t + surface.normal * off;
+        shadow_whole = ray.whole + ivec3(floor(from));
+        vec3 p = from - floor(from);
+        vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * h;
+        for (int i = 0; i < 4 * 16; ++i) {
+            int channel = i >> 4;
+            int part_index = i & 15;
+            uint index = push.first_light + uint(channel);
+            if (index >= frame.light_count) break;
+            LightSample light = sample_light(lights[index], p_world);
+            int parts = disc_parts(light.tan_radius);
+            if (part_index >= parts) continue;
+            if (dot(light.l, surface.normal) <= 0.0 || largest3(light.illuminance) <= 0.0) continue;
+            vec2 on_disc = shadow_sub_disc(part_index, parts, 0.0);
+            vec3 l = shadow_direction(light.l, light.tan_radius, on_disc);
+            if (dot(l, surface.normal) <= 0.0) continue;
+            // Beyond the grid is only what code describes; bricks cast no shadow from there.
+            float t_in;
+            float t_out;
+            grid_stretch(texel_ray(shadow_whole, p, l), t_in, t_out);
+            bool beyond = frame.outside_count != 0u || (frame.flags & kFrameUnpruned) != 0u;
+            float t_last = min(light.distance / h, beyond ? kFarVoxels : t_out + 2.0 * float(kBrickVoxels));
+            fractions[channel] += shadow_visible(p, l, light.tan_radius * inversesqrt(float(parts)), ShadowMarch(0.5, t_last, 0.25, kShadowSteps)) / float(parts);
+        }
+    }
+    imageStore(visible_fractions, pixel, fractions);
+}

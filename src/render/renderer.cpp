@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: MIT
+#include <kiln/renderer.h>
+
+#include "base/assert.h"
+#include "base/format.h"
+#include "base/log.h"
+#include "field/field.h"
+#include "render/frame.h"
+#include "render/graph_runner.h"
+#include "render/lib/ggx_table.h"
+#include "render/lib/pack.h"
+#include "render/picture.h"
+#include "rhi/create.h"
+
+#include <algorithm>
+
+namespace kiln {
+
+namespace render {
+namespace {
+
+// Tiles bound the memory of a frame's images (about 100 bytes a pixel), whatever the size of the picture.
+constexpr int kTileWidth = 2048;
+constexpr int kTilePixels = 1 << 21;
+
+}  // namespace
+}  // namespace render
+
+using namespace render;
+
+struct Renderer::Impl {
+    std::unique_ptr<rhi::Device> device;
+    std::unique_ptr<Runner> runner;
+    std::unique_ptr<GpuField> field;
+    std::string fault;  // first message of the device since the last call
+    rhi::BufferHandle ggx_table;
+    RenderStats stats;
+
+    ~Impl() {
+        field.reset();
+        if (runner && ggx_table) {
+            runner->forget(ggx_table);
+            device->destroy(ggx_table);
+        }
+        runner.reset();
+    }
+
+    Result<void> prepare();
+    Result<Picture> render(const Frame& frame, const RenderSettings& settings);
+    Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture);
+    void add_times(const FrameTimes& times);
+    // What the device complained about, as this call's error.
+    Result<void> healthy() {
+        if (fault.empty()) return {};
+        return Error{std::exchange(fault, {}), device->lost() ? ErrorKind::OutOfMemory : ErrorKind::Failed};
+    }
+};
+
+Result<void> Renderer::Impl::prepare() {
+    device->set_error_sink([this](std::string_view sentence) {
+        log::error("{}", sentence);
+        if (fault.empty()) fault = sentence;
+    });
+    runner = std::make_unique<Runner>(*device);
+    field = std::make_unique<GpuField>(*runner);
+    const std::span<const uint32_t> table = shade::ggx_albedo_table();
+    auto buffer = device->create_buffer({.size = table.size_bytes(), .label = "ggx albedo"});
+    if (!buffer) return buffer.error();
+    ggx_table = *buffer;
+    if (auto written = device->write_buffer(ggx_table, 0, std::as_bytes(table)); !written) return written;
+    stats.device = device->info().name;
+    return healthy();
+}
+
+void Renderer::Impl::add_times(const FrameTimes& times) {
+    stats.frame_ms += times.total_ms;
+    for (const PassTime& pass : times.passes) {
+        const auto same = std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == pass.name; });
+        if (same != stats.passes.end()) {
+            same->second += pass.ms;
+        } else {
+            stats.passes.emplace_back(pass.name, pass.ms);
+        }
+    }
+}
+
+Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture) {
+    Graph g(*runner);
+    TileInputs in;
+    in.field = field->import(g);
+    in.frame = g.block(params);
+    const FrameRay no_ray{};
+    in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
+    const std::vector<MaterialRecord> materials = material_records(frame);
+    in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
+    std::vector<shade::LightRecord> lights;
+    for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
+    in.light_count = uint32_t(lights.size());
+    if (lights.empty()) lights.emplace_back();
+    in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
+    in.ggx_table = g.import("ggx albedo", ggx_table);
+    in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+    in.analytic = settings.analytic;
+    in.exact = settings.analytic || field->leaves_grid();
+
+    const TileResult tile = record_tile(g, in, settings.view);
+    auto submit = runner->execute(g);
+    if (!submit) return submit.error();
+    auto radiance = tile.radiance.get();
+    if (!radiance) return radiance.error();
+    auto shown = tile.shown.get();
+    if (!shown) return shown.error();
+    auto depth = tile.depth.get_as<float>();
+    if (!depth) return depth.error();
+    for (const Readback& counted : tile.evaluations) {
+        auto words = counted.get_as<uint32_t>();
+        if (!words) return words.error();
+        for (const uint32_t n : *words) stats.evaluations += n;
+    }
+    if (device->caps().timestamp) {
+        auto times = runner->times(*submit);
+        if (!times) return times.error();
+        add_times(*times);
+    }
+    place_tile(picture, params.tile_x, params.tile_y, params.tile_width, params.tile_height, *radiance, *shown, *depth);
+    return {};
+}
+
+Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings& settings) {
+    KILN_ASSERT(frame.field != nullptr, "a Frame without a field; World::frame() makes one");
+    fault.clear();
+    const uint64_t late = runner->pipelines().made_late();
+    stats = {};
+    stats.device = device->info().name;
+    {
+        const bool half = frame.field->options().format == field::DistanceFormat::Half;
+        const bool by_copy = settings.atlas_by_copy || !device->caps().storage_r16f;
+        const auto bake = bake_kernels(half ? rhi::Format::R16Float : rhi::Format::R8Snorm, by_copy);
+        if (auto warm = runner->pipelines().warm_up(bake); !warm) return warm.error();
+    }
+    if (auto updated = field->update(frame.field, settings.atlas_by_copy); !updated) return updated.error();
+    const auto kernels = frame_kernels(settings.analytic || field->leaves_grid(), settings.view);
+    if (auto warm = runner->pipelines().warm_up(kernels); !warm) return warm.error();
+
+    auto params = frame_params(frame, settings, *field);
+    if (!params) return params.error();
+    params->sky = shade::sky_params(frame.environment);
+    if (field->bake_ms() > 0) {
+        stats.frame_ms = field->bake_ms();
+        stats.passes.emplace_back("bake", field->bake_ms());
+    }
+    Picture picture;
+    picture.width = settings.width;
+    picture.height = settings.height;
+    picture.view = settings.view;
+    const size_t pixels = size_t(settings.width) * size_t(settings.height);
+    picture.rgba.resize(pixels * 4);
+    picture.srgb.resize(pixels * 4);
+    picture.depth.resize(pixels);
+    const int tile_width = std::min(settings.width, kTileWidth);
+    const int tile_height = std::min(settings.height, kTilePixels / tile_width);
+    for (int y = 0; y < settings.height; y += tile_height) {
+        for (int x = 0; x < settings.width; x += tile_width) {
+            FrameParams tile = *params;
+            tile.tile_x = x;
+            tile.tile_y = y;
+            tile.tile_width = std::min(tile_width, settings.width - x);
+            tile.tile_height = std::min(tile_height, settings.height - y);
+            if (auto done = render_tile(frame, settings, tile, picture); !done) return done.error();
+        }
+    }
+    stats.bricks = int(frame.field->stats().bricks);
+    stats.edits = int(std::count_if(frame.field->program().edits.begin(), frame.field->program().edits.end(),
+                                    [](const sdf::EditSpan& e) { return e.count != 0; }));
+    stats.atlas_bytes = field->atlas_bytes();
+    stats.pipelines_created = runner->pipelines().made();
+    stats.coarsened = frame.coarsened;
+    if (runner->pipelines().made_late() != late) log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
+    if (auto ok = healthy(); !ok) return ok.error();
+    return picture;
+}
+
+Renderer::Renderer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Renderer::Renderer(Renderer&&) noexcept = default;
+Renderer& Renderer::operator=(Renderer&&) noexcept = default;
+Renderer::~Renderer() = default;
+
+Result<Renderer> Renderer::create(const RendererOptions& options) {
+    auto device = rhi::create_device({.device = options.device, .validation = options.validation});
+    if (!device) return device.error();
+    auto impl = std::make_unique<Impl>();
+    impl->device = std::move(*device);
+    if (auto ready = impl->prepare(); !ready) return ready.error();
+    return Renderer(std::move(impl));
+}
+
+Result<Picture> Renderer::render(const Frame& frame, const RenderSettings& settings) { return impl_->render(frame, settings); }
+
+const RenderStats& Renderer::stats() const { return impl_->stats; }
+
+std::vector<DeviceInfo> devices() {
+    std::vector<DeviceInfo> out;
+    auto found = rhi::list_devices();
+    if (!found) return out;
+    for (const rhi::DeviceInfo& d : *found) {
+        out.push_back({.name = d.name,
+                       .backend = d.backend,
+                       .driver = d.driver,
+                       .kind = std::string(rhi::name(d.kind)),
+                       .api_version = d.api,
+                       .usable = d.usable,
+                       .why_not = d.unusable_because});
+    }
+    return out;
+}
+
+}  // namespace kiln
