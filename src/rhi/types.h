@@ -356,7 +356,8 @@ constexpr uint32_t kMaxTextureLayers = 256;
 constexpr uint32_t kMaxColorTargets = 8;
 constexpr uint32_t kBindingAlignment = 256;  // of a buffer binding's offset
 
-// Tiers above the floor. Every one has a fallback.
+// Tiers above the floor. Every one has a fallback. No backend grants bindless, buffer_address, min_max_sampler,
+// mesh_shader, rt_pipeline or async_compute yet.
 struct Caps {
     bool timestamp = false;
     bool storage_r16f = false;  // storage textures of R16Float, R16Uint, Rg16Float, R8Snorm, R11g11b10Float

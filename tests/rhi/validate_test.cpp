@@ -642,6 +642,19 @@ TEST_F(NullTest, FaultyRecordingIsNotSubmitted) {
     device_->destroy(b);
 }
 
+TEST_F(NullTest, MissingBarrierIsNotSubmitted) {
+    const BufferHandle b = must(device_->create_buffer({.size = 64, .label = "b"}));
+    auto e = device_->create_encoder("racing");
+    e->clear_buffer(b);
+    e->clear_buffer(b);
+    Result<SubmitId> id = device_->submit(std::move(e));
+    ASSERT_FALSE(id);
+    EXPECT_NE(id.error().message.find("'racing': clear_buffer"), std::string::npos) << id.error().message;
+    EXPECT_EQ(device_->last_submit(), 0u);
+    EXPECT_TRUE(complained("without a barrier"));
+    device_->destroy(b);
+}
+
 TEST_F(NullTest, LeaksAreCountedAndNamed) {
     const BufferHandle b = must(device_->create_buffer({.size = 64, .label = "forgotten"}));
     const TextureHandle t = must(device_->create_texture({.size = {4, 4}, .label = "picture"}));

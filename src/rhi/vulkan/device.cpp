@@ -39,8 +39,6 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     want12.timelineSemaphore = VK_TRUE;
     want12.scalarBlockLayout = has12.scalarBlockLayout;
     want12.shaderBufferInt64Atomics = has12.shaderBufferInt64Atomics;
-    want12.bufferDeviceAddress = has12.bufferDeviceAddress;
-    want12.samplerFilterMinmax = has12.samplerFilterMinmax;
     want12.vulkanMemoryModel = has12.vulkanMemoryModel;
     VkPhysicalDeviceVulkan11Features want11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
                                             .pNext = &want12};
@@ -54,9 +52,7 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     want.features.vertexPipelineStoresAndAtomics = has.features.vertexPipelineStoresAndAtomics;
     want.features.independentBlend = has.features.independentBlend;
     caps_.storage_r16f = has.features.shaderStorageImageExtendedFormats;
-    caps_.buffer_address = has12.bufferDeviceAddress;
     caps_.int64_buffer_atomics = has12.shaderBufferInt64Atomics && has.features.shaderInt64;
-    caps_.min_max_sampler = has12.samplerFilterMinmax;
     caps_.multi_draw_indirect = has.features.multiDrawIndirect;
 
     const float priority = 1.0f;
