@@ -67,7 +67,8 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.width = p.tile_width = width;
     p.height = p.tile_height = height;
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
-              (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u);
+              (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
+              (field.outside_is_plane() ? kFrameOutsidePlane : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
@@ -112,22 +113,19 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, bool want_vi
     return out;
 }
 
-std::vector<const Kernel*> frame_kernels(bool exact, View view) {
-    std::vector<const Kernel*> out{&kMarch, exact ? &kResolveExact : &kResolve};
-    if (exact) out.push_back(&kMarchExact);
+std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
+    std::vector<const Kernel*> out;
+    if (!in.analytic) out.push_back(&kMarch);
+    if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
+    out.push_back(in.exact ? &specialised(kResolveExact, in.use) : &kResolve);
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;
     }
-    out.push_back(exact ? &kShadowExact : &kShadow);
+    out.push_back(in.shadow_exact ? &specialised(kShadowExact, in.use) : &kShadow);
     out.push_back(&kLight);
     out.push_back(&kTonemap);
     return out;
-}
-
-std::vector<const Kernel*> bake_kernels(rhi::Format format, bool by_copy) {
-    if (format == rhi::Format::R16Float) return {by_copy ? &kBakeCopyHalf : &kBakeHalf};
-    return {by_copy ? &kBakeCopySnorm8 : &kBakeSnorm8};
 }
 
 }  // namespace kiln::render

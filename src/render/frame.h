@@ -23,7 +23,6 @@ struct TileResult {
 TileResult record_tile(Graph& g, const TileInputs& in, View view, bool want_visibility = false);
 
 // Kernels of a frame, for warm-up.
-std::vector<const Kernel*> frame_kernels(bool exact, View view);
-std::vector<const Kernel*> bake_kernels(rhi::Format format, bool by_copy);
+std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view);
 
 }  // namespace kiln::render

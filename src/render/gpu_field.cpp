@@ -8,6 +8,8 @@
 #include "render/passes/bake.gpu.h"
 #include "render/passes/passes.h"
 
+#include <kiln/shapes.h>
+
 #include <algorithm>
 #include <bit>
 #include <cstring>
@@ -161,20 +163,28 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, bool stora
 }
 
 // Edits that reach out of the grid, as one program; nothing when none does or the world is empty there.
-std::vector<sdf::Instruction> GpuField::outside_code() const {
+std::vector<sdf::Instruction> GpuField::outside_code() {
     const sdf::Program& program = field_->program();
     const field::GridParams g = field_->grid();
     const float cell = g.voxel_size * float(field::kBrickVoxels);
     const Box3 grid{{float(g.cell_x) * cell, float(g.cell_y) * cell, float(g.cell_z) * cell},
                     {float(g.cell_x + g.size_x) * cell, float(g.cell_y + g.size_y) * cell, float(g.cell_z + g.size_z) * cell}};
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
+    int edits = 0;
     bool adds = false;
+    bool straight = true;  // only what keeps a half-space one
     for (const sdf::EditSpan& edit : program.edits) {
         if (edit.count == 0 || stays_in(edit, grid)) continue;
+        ++edits;
         adds = adds || edit.op == Op::Union;
-        out.insert(out.end(), program.code.begin() + edit.first, program.code.begin() + edit.first + edit.count);
+        for (const sdf::Instruction in : std::span(program.code).subspan(edit.first, edit.count)) {
+            out.push_back(in);
+            if (in.opcode() == sdf::Opcode::Shape) straight = straight && in.aux() == uint32_t(ShapeKind::Plane);
+            if (in.opcode() > sdf::Opcode::PointAffineOn && in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Combine) straight = false;
+        }
     }
     if (!adds) out.clear();
+    outside_is_plane_ = adds && edits == 1 && straight;
     return out;
 }
 
@@ -203,6 +213,8 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_
     const auto code = [](const field::Field& f) { return f.code(); };
     std::vector<sdf::Instruction> programs = next->program().code;
     program_count_ = uint32_t(programs.size());
+    if (device_->info().kind == rhi::DeviceKind::Cpu) use_ = both(tape_use(programs), specialised_once_ ? use_ : TapeUse{0, 0, 0, 1});
+    specialised_once_ = true;
     const std::vector<sdf::Instruction> outside = outside_code();
     outside_count_ = uint32_t(outside.size());
     programs.insert(programs.end(), outside.begin(), outside.end());
@@ -256,6 +268,9 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_
 
 Result<void> GpuField::bake(std::span<const uint32_t> slots, bool by_copy) {
     bricks_baked_ = uint32_t(slots.size());
+    if (slots.empty()) return {};
+    const Kernel* const kernels[] = {&bake_kernel(format_, by_copy, use_)};
+    if (auto warm = runner_->pipelines().warm_up(kernels); !warm) return warm;
     for (size_t at = 0; at < slots.size(); at += kJobsPerSlice) {
         const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
         Graph graph(*runner_);
@@ -265,7 +280,7 @@ Result<void> GpuField::bake(std::span<const uint32_t> slots, bool by_copy) {
         push.voxels_per_metre = 1.0f / push.voxel_size;
         push.params_first = params_first();
         push.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
-        bake_bricks(graph, f, slice, push, format_, by_copy);
+        bake_bricks(graph, f, slice, push, format_, by_copy, use_);
         graph.output(f.distances, rhi::Access::SampledReadCompute);
         graph.output(f.materials, rhi::Access::SampledReadCompute);
         graph.output(f.palettes, rhi::Access::StorageReadCompute);

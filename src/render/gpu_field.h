@@ -5,6 +5,7 @@
 
 #include "field/field.h"
 #include "render/graph.h"
+#include "render/passes/tape_use.h"
 #include "rhi/device.h"
 
 #include <memory>
@@ -35,6 +36,8 @@ public:
     field::GridParams grid() const;                     // with the atlas layout filled in
     float distance_scale() const;                  // voxels a unit of the atlas
     bool leaves_grid() const { return outside_count_ != 0; }
+    bool outside_is_plane() const { return outside_is_plane_; }  // one half-space and nothing else leaves the grid
+    const TapeUse& use() const { return use_; }                  // what can occur on the tapes; everything, on GPUs
     uint32_t params_first() const;                 // in the numbers buffer
     uint32_t outside_first() const;                // in the program buffer
     uint32_t outside_count() const { return outside_count_; }
@@ -62,7 +65,7 @@ private:
     Result<void> make_atlas(uint32_t slots, rhi::Format format, bool storage);
     void drop_atlas();
     Result<void> bake(std::span<const uint32_t> slots, bool by_copy);
-    std::vector<sdf::Instruction> outside_code() const;
+    std::vector<sdf::Instruction> outside_code();
 
     Runner* runner_;
     rhi::Device* device_;
@@ -75,6 +78,9 @@ private:
     bool storage_ = false;  // the atlas of distances is a storage texture
     uint32_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
+    bool outside_is_plane_ = false;
+    TapeUse use_;
+    bool specialised_once_ = false;  // use_ only ever grows from there
     uint32_t bricks_baked_ = 0;
     double bake_ms_ = 0;
 };

@@ -48,6 +48,16 @@ struct Renderer::Impl {
     Result<void> prepare();
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture);
+    // The switches of a frame; its resources are still to come.
+    TileInputs inputs(const RenderSettings& settings) const {
+        TileInputs in;
+        in.analytic = settings.analytic;
+        in.exact = settings.analytic || field->leaves_grid();
+        // A lone half-space has no shadow of its own to cast.
+        in.shadow_exact = settings.analytic || (field->leaves_grid() && !field->outside_is_plane());
+        in.use = field->use();
+        return in;
+    }
     void add_times(const FrameTimes& times);
     // What the device complained about, as this call's error.
     Result<void> healthy() {
@@ -75,18 +85,19 @@ Result<void> Renderer::Impl::prepare() {
 void Renderer::Impl::add_times(const FrameTimes& times) {
     stats.frame_ms += times.total_ms;
     for (const PassTime& pass : times.passes) {
-        const auto same = std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == pass.name; });
+        const std::string name = pass.name.substr(0, pass.name.find(" ["));  // without what a kernel is specialised for
+        const auto same = std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == name; });
         if (same != stats.passes.end()) {
             same->second += pass.ms;
         } else {
-            stats.passes.emplace_back(pass.name, pass.ms);
+            stats.passes.emplace_back(name, pass.ms);
         }
     }
 }
 
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture) {
     Graph g(*runner);
-    TileInputs in;
+    TileInputs in = inputs(settings);
     in.field = field->import(g);
     in.frame = g.block(params);
     const FrameRay no_ray{};
@@ -100,8 +111,6 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
     in.ggx_table = g.import("ggx albedo", ggx_table);
     in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
-    in.analytic = settings.analytic;
-    in.exact = settings.analytic || field->leaves_grid();
 
     const TileResult tile = record_tile(g, in, settings.view);
     auto submit = runner->execute(g);
@@ -132,15 +141,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
-    {
-        const bool half = frame.field->options().format == field::DistanceFormat::Half;
-        const bool by_copy = settings.atlas_by_copy || !device->caps().storage_r16f;
-        const auto bake = bake_kernels(half ? rhi::Format::R16Float : rhi::Format::R8Snorm, by_copy);
-        if (auto warm = runner->pipelines().warm_up(bake); !warm) return warm.error();
-    }
     if (auto updated = field->update(frame.field, settings.atlas_by_copy); !updated) return updated.error();
-    const auto kernels = frame_kernels(settings.analytic || field->leaves_grid(), settings.view);
-    if (auto warm = runner->pipelines().warm_up(kernels); !warm) return warm.error();
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(settings), settings.view)); !warm) return warm.error();
 
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();

@@ -43,23 +43,29 @@ std::vector<CopyRegion> copy_regions(std::span<const uint32_t> slots, uint32_t b
 
 }  // namespace
 
-void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy) {
+const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use) {
     const bool half = format == rhi::Format::R16Float;
     KILN_ASSERT(half || format == rhi::Format::R8Snorm);
+    if (by_copy) return specialised(half ? kBakeCopyHalf : kBakeCopySnorm8, use);
+    return specialised(half ? kBakeHalf : kBakeSnorm8, use);
+}
+
+void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy,
+                 const TapeUse& use) {
     const Buffer jobs = g.upload("bake jobs", slots);
     const Groups groups{uint32_t(slots.size()), 1, 1};
     if (!by_copy) {
-        g.dispatch(half ? kBakeHalf : kBakeSnorm8, groups,
+        g.dispatch(bake_kernel(format, by_copy, use), groups,
                    {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.palettes),
                     g.read_write(f.dropped), g.write(f.materials), g.write(f.distances)},
                    push);
         return;
     }
-    const uint32_t row_bytes = half ? 16 : 8;
+    const uint32_t row_bytes = format == rhi::Format::R16Float ? 16 : 8;
     const uint32_t side_by_side = uint32_t(kBakeCopyBytes) / row_bytes;
     const uint64_t groups_of_bricks = (slots.size() + side_by_side - 1) / side_by_side;
     Buffer codes = g.create_buffer("bake codes", groups_of_bricks * kBakeCopyRows * kBakeCopyBytes);
-    g.dispatch(half ? kBakeCopyHalf : kBakeCopySnorm8, groups,
+    g.dispatch(bake_kernel(format, by_copy, use), groups,
                {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.palettes),
                 g.read_write(f.dropped), g.write(f.materials), g.write(codes)},
                push);

@@ -19,6 +19,7 @@ uvec2 sdf_code(uint at) { return code[at]; }
 float sdf_param(uint at) { return numbers[push.params_first + at]; }
 float sdf_sample(uint at) { return numbers[at]; }
 #define KILN_TAPE_MATERIALS
+#include "render/passes/tape_use.glsl"
 #include "sdf/tape.glsl"
 
 void store_row(uvec3 atlas_texel, uint job, uint row, float d_voxels[8]);

@@ -24,8 +24,10 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
     bool in_segment = false;
     bool fresh = true;       // no evaluation in this segment yet
     bool bracketed = false;
-    float positive = 0.0;    // last place in air
-    float solid = 0.0;
+    float positive = 0.0;    // last place in air, and its value
+    float positive_value = 1.0;
+    float solid = 0.0;       // first place known to be solid, and its value
+    float solid_value = -1.0;
     int outside_steps = 0;
     for (;;) {
         if (!in_segment) {
@@ -40,20 +42,9 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
             fresh = true;
         }
         uvec2 segment_code = code_of(w.state, w.slot);
-        float d = tape_distance(segment_code.x, segment_code.y, origin + ray.direction * (w.t * h));
+        float d = tape_distance(segment_code.x, segment_code.y, origin + ray.direction * (w.t * h)) / h;
         hit.steps++;
-        if (bracketed) {
-            if (d > 0.0) positive = w.t; else solid = w.t;
-            if (solid - positive <= max(1e-5, solid * 2.4e-7)) {
-                hit.t = solid;
-                hit.state = w.state;
-                hit.slot = w.slot;
-                return hit;
-            }
-            w.t = 0.5 * (positive + solid);
-            continue;
-        }
-        if (d <= 0.0) {
+        if (!bracketed && d <= 0.0) {
             if (fresh) {
                 // Solid from the segment's start: the ray's own start, or a rounding of where one segment meets the next.
                 hit.t = w.t;
@@ -62,21 +53,48 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
                 return hit;
             }
             bracketed = true;
-            solid = w.t;
-            w.t = 0.5 * (positive + solid);
+            positive_value = max(positive_value, 1e-30);
+        } else if (bracketed) {
+            // False position; the end that stays counts half (Dowell and Jarratt, "The Illinois Method", 1971).
+            if (d > 0.0) solid_value *= 0.5; else positive_value *= 0.5;
+        }
+        if (bracketed) {
+            if (d > 0.0) {
+                positive = w.t;
+                positive_value = d;
+            } else {
+                solid = w.t;
+                solid_value = min(d, -1e-30);
+            }
+            if (solid - positive <= max(1e-5, solid * 2.4e-7) || (d <= 0.0 && d > -2e-6)) {
+                hit.t = solid;
+                hit.state = w.state;
+                hit.slot = w.slot;
+                return hit;
+            }
+            float share = clamp(positive_value / (positive_value - solid_value), 0.02, 0.98);
+            w.t = positive + (solid - positive) * share;
             continue;
         }
+        float slope = (d - positive_value) / (w.t - positive);
+        bool straight = !fresh && w.state == kSeenOutside && (frame.flags & kFrameOutsidePlane) != 0u;
         fresh = false;
         positive = w.t;
-        bool outside = walk_outside(w);
-        if (w.t >= w.segment_end || d >= kTapeEmptyTest) {
+        positive_value = d;
+        if (w.t >= w.segment_end || d * h >= kTapeEmptyTest || (straight && slope >= 0.0)) {
             w.t = max(w.t, w.segment_end);
             in_segment = false;
             continue;
         }
+        if (straight) {
+            // Just past the root of a straight line.
+            w.t = min((w.t - d / slope) * (1.0 + 1e-6) + 0.01, w.segment_end);
+            continue;
+        }
         // Far from the grid nothing smaller than half a pixel is looked for.
+        bool outside = walk_outside(w);
         float least = outside ? max(kExactStepVoxels, 0.5 * frame.pixel_angle * w.t) : max(kExactStepVoxels, 2.4e-7 * w.t);
         if (outside && ++outside_steps > kOutsideSteps) return hit;
-        w.t = min(w.t + max(d / h, least), w.segment_end);
+        w.t = min(w.t + max(d, least), w.segment_end);
     }
 }

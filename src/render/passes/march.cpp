@@ -25,7 +25,7 @@ Visibility march(Graph& g, const TileInputs& in) {
     if (in.exact) {
         Image both = g.create("visibility exact", {.size = in.size, .format = rhi::Format::Rgba32Uint});
         Buffer counted = g.create_buffer("march exact evaluations", uint64_t{groups} * 4);
-        g.dispatch(kMarchExact, in.size,
+        g.dispatch(specialised(kMarchExact, in.use), in.size,
                    {g.uniform(in.frame), g.read(f.cells), g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers),
                     g.read(in.rays), g.read(words), g.write(both), g.write(counted)});
         out.evaluations.push_back(counted);

@@ -7,6 +7,7 @@
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
 #include "render/passes/shadow.gpu.h"
+#include "render/passes/tape_use.h"
 
 #include <vector>
 
@@ -16,7 +17,10 @@ extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kLight, kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
-void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy);
+void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy,
+                 const TapeUse& use);
+
+const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
 
 // What every pass of one tile reads.
 struct TileInputs {
@@ -30,6 +34,8 @@ struct TileInputs {
     rhi::Extent size;        // of the tile
     bool exact = false;      // some code is marched: analytic, or edits leave the grid
     bool analytic = false;   // … instead of the bricks
+    bool shadow_exact = false;  // exact code may cast shadows
+    TapeUse use;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

@@ -20,7 +20,7 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& visibility) {
     if (in.exact) {
         uses.insert(uses.end(), {g.read(f.code), g.read(f.program), g.read(f.numbers)});
     }
-    g.dispatch(in.exact ? kResolveExact : kResolve, in.size, uses);
+    g.dispatch(in.exact ? specialised(kResolveExact, in.use) : kResolve, in.size, uses);
     return out;
 }
 

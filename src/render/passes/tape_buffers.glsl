@@ -8,4 +8,5 @@ const uint kFromProgram = 0x80000000u;
 uvec2 sdf_code(uint at) { return (at & kFromProgram) != 0u ? program_code[at & ~kFromProgram] : code[at]; }
 float sdf_param(uint at) { return numbers[frame.params_first + at]; }
 float sdf_sample(uint at) { return numbers[at]; }
+#include "render/passes/tape_use.glsl"
 #include "sdf/tape.glsl"

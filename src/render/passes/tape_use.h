@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: MIT
+// Kernels made for the shapes in use; see tape_use.glsl.
+#pragma once
+
+#include "render/graph_kernel.h"
+#include "sdf/program.h"
+
+namespace kiln::render {
+
+// What can occur on a tape. Software rasterisers execute the branches that no lane takes, too: there kernels are made for what is in
+// use (a new pipeline when a new kind of shape appears); on GPUs one kernel serves all.
+struct TapeUse {
+    uint32_t shapes = ~0u, warps = ~0u, opcodes = ~0u;  // a bit a kind
+    uint32_t registers = sdf::kRegisters;
+    friend bool operator==(const TapeUse&, const TapeUse&) = default;
+};
+TapeUse tape_use(std::span<const sdf::Instruction> code);
+TapeUse both(const TapeUse& a, const TapeUse& b);
+// The kernel for that use; lives as long as the program.
+const Kernel& specialised(const Kernel& kernel, const TapeUse& use);
+
+}  // namespace kiln::render
