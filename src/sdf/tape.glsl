@@ -8,6 +8,16 @@
 // Then: float tape_distance(uint first, uint count, vec3 p_world), or, with KILN_TAPE_MATERIALS defined,
 //       float tape_materials(uint first, uint count, vec3 p_world, out Mix mix).
 
+// It may define KILN_USES_SHAPE(kind), KILN_USES_WARP(kind), KILN_USES_OPCODE(opcode), KILN_TAPE_REGISTERS as specialisation constants
+// that say what can occur: software rasterisers execute the branches that no lane takes, too.
+
+#ifndef KILN_USES_SHAPE
+#define KILN_USES_SHAPE(kind) true
+#define KILN_USES_WARP(kind) true
+#define KILN_USES_OPCODE(opcode) true
+#define KILN_TAPE_REGISTERS 24
+#endif
+
 #include "sdf/lang/lang.glsl"
 #define KILN_T float
 #include "sdf/lang/trig.sdf.h"
@@ -34,7 +44,6 @@
 #undef gt
 #undef ge
 
-const int kTapeRegisters = 24;
 const float kTapeEmpty = 1e30;
 const float kTapeEmptyTest = 1e29;
 const uint kNoMaterial = 65535u;
@@ -70,11 +79,11 @@ vec3 tape_affine(vec3 p, uint at) {
 
 #ifdef KILN_TAPE_MATERIALS
 float tape_materials(uint first, uint count, vec3 p_world, out Mix mix_out) {
-    Mix mixes[kTapeRegisters];
+    Mix mixes[KILN_TAPE_REGISTERS];
 #else
 float tape_distance(uint first, uint count, vec3 p_world) {
 #endif
-    float value[kTapeRegisters];
+    float value[KILN_TAPE_REGISTERS];
     vec3 p = p_world;
     for (uint pc = first; pc < first + count; ++pc) {
         uvec2 instruction = sdf_code(pc);
@@ -88,23 +97,36 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             case kOpPointCell: p = p_world; break;
             case kOpPointTranslate: p = p_world - tape_vec3(at); break;
             case kOpPointAffine:
-            case kOpPointAffineOn: p = tape_affine((word & 15u) == kOpPointAffine ? p_world : p, at); break;
-            case kOpPointWarp: p = point_warp(aux, p, at); break;
-            case kOpPointCopy: p = copy_warp(aux, p, at + 6u, tape_vec3(at), tape_vec3(at + 3u)); break;
-            case kOpPointClamp: p = clamp(p, tape_vec3(at), tape_vec3(at + 3u)); break;
+            case kOpPointAffineOn:
+                if (KILN_USES_OPCODE(kOpPointAffine) || KILN_USES_OPCODE(kOpPointAffineOn)) {
+                    p = tape_affine((word & 15u) == kOpPointAffine ? p_world : p, at);
+                }
+                break;
+            case kOpPointWarp:
+                if (KILN_USES_OPCODE(kOpPointWarp)) p = point_warp(aux, p, at);
+                break;
+            case kOpPointCopy:
+                if (KILN_USES_OPCODE(kOpPointCopy)) p = copy_warp(aux, p, at + 6u, tape_vec3(at), tape_vec3(at + 3u));
+                break;
+            case kOpPointClamp:
+                if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
+                break;
             case kOpShape:
                 value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);
 #ifdef KILN_TAPE_MATERIALS
                 mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
 #endif
                 break;
-            case kOpValue: value[dst] = value_warp(aux, value[dst] * sdf_param(at + 1u), p, at + 2u) * sdf_param(at); break;
-            case kOpBound: {
-                vec3 q = max(tape_vec3(at + 2u) - p, p - tape_vec3(at + 5u));
-                float box = length(max(q, vec3(0.0))) + min(max(q.x, max(q.y, q.z)), 0.0);
-                value[dst] = max(min(value[dst], sdf_param(at + 1u)), box * sdf_param(at));
+            case kOpValue:
+                if (KILN_USES_OPCODE(kOpValue)) value[dst] = value_warp(aux, value[dst] * sdf_param(at + 1u), p, at + 2u) * sdf_param(at);
                 break;
-            }
+            case kOpBound:
+                if (KILN_USES_OPCODE(kOpBound)) {
+                    vec3 q = max(tape_vec3(at + 2u) - p, p - tape_vec3(at + 5u));
+                    float box = length(max(q, vec3(0.0))) + min(max(q.x, max(q.y, q.z)), 0.0);
+                    value[dst] = max(min(value[dst], sdf_param(at + 1u)), box * sdf_param(at));
+                }
+                break;
             case kOpCombine: {
                 uint op = aux & 3u;
                 float x = value[a];
@@ -130,6 +152,7 @@ float tape_distance(uint first, uint count, vec3 p_world) {
 #endif
                 break;
             case kOpTake:
+                if (!KILN_USES_OPCODE(kOpTake)) break;
                 value[dst] = aux == 1u ? -value[b] : value[b];
 #ifdef KILN_TAPE_MATERIALS
                 if (mixes[b].id0 == float(kNoMaterial)) {
