@@ -16,7 +16,7 @@ struct Grids {
     std::map<std::string, uint32_t> by_file;
 };
 
-/// The grey values of a PNG image, 0 for black and 1 for white, as they stand (no gamma).
+/// The grey values (of colours: red) of a PNG image, 0 for black and 1 for white, as they stand (no gamma).
 Result<sdf::HeightGrid> load_heights(const std::string& path);
 
 /// What sdf::compile reads. Edits and objects are copied only when some shape has a file.
