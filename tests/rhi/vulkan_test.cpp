@@ -4,6 +4,7 @@
 #include "rhi_test.h"
 
 #include "shaders/rhi_add.spv.h"
+#include "shaders/rhi_count.spv.h"
 #include "shaders/rhi_triangle_frag.spv.h"
 #include "shaders/rhi_triangle_vert.spv.h"
 #include "shaders/rhi_volume_sample.spv.h"
@@ -137,6 +138,54 @@ TEST_F(VulkanGpu, VolumeOfHalvesIsWrittenCopiedAndSampledSmoothly) {
     d.destroy(sampler_pipeline);
     d.destroy(write);
     d.destroy(sample);
+}
+
+// A dispatch whose size another dispatch wrote, and atomics.
+TEST_F(VulkanGpu, IndirectDispatchCountsEveryThread) {
+    Device& d = *device_;
+    const BufferHandle total = must(d.create_buffer({.size = 4, .label = "total"}));
+    BufferHandle groups[2];
+    for (BufferHandle& b : groups)
+        b = must(
+            d.create_buffer({.size = 12, .usage = BufferUsage::Storage | BufferUsage::Indirect, .label = "groups"}));
+    const BufferHandle back = must(
+        d.create_buffer({.size = 4, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const ShaderModule shader = must(d.create_shader_module({.spirv = kRhiCountSpv, .label = "count"}));
+    const ComputePipeline pipeline = must(d.create_compute_pipeline({.shader = shader, .label = "count"}));
+    BindGroup bound[2];
+    for (int i = 0; i < 2; ++i) {
+        const BindGroupEntry entries[] = {{.binding = 0, .buffer = total}, {.binding = 1, .buffer = groups[i]}};
+        bound[i] =
+            must(d.create_bind_group({.layout = d.group_layout(pipeline, 0), .entries = entries, .label = "count"}));
+    }
+    auto e = d.create_encoder("count");
+    e->clear_buffer(total);
+    for (int i = 0; i < 2; ++i) {
+        barrier(*e, {.buffer = total,
+                     .before = i == 0 ? Access::CopyWrite : Access::StorageWriteCompute,
+                     .after = Access::StorageWriteCompute});
+        ComputePass& pass = e->begin_compute("count");
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, bound[i]);
+        pass.set_push_struct(5u);
+        if (i == 0) {
+            pass.dispatch(3);
+        } else {
+            pass.dispatch_indirect(groups[0], 0);
+        }
+        pass.end();
+        if (i == 0)
+            barrier(*e, {.buffer = groups[0], .before = Access::StorageWriteCompute, .after = Access::IndirectRead});
+    }
+    barrier(*e, {.buffer = total, .before = Access::StorageWriteCompute, .after = Access::CopyRead});
+    e->copy_buffer(total, 0, back, 0, 4);
+    barrier(*e, {.buffer = back, .before = Access::CopyWrite, .after = Access::HostRead});
+    must(d.wait(must(d.submit(std::move(e)))));
+    EXPECT_EQ(mapped<uint32_t>(d, back, 1)[0], 32u * (3 + 5 * 2));
+    for (const BufferHandle b : {total, groups[0], groups[1], back}) d.destroy(b);
+    for (const BindGroup g : bound) d.destroy(g);
+    d.destroy(pipeline);
+    d.destroy(shader);
 }
 
 TEST_F(VulkanGpu, TextureCopiesMoveEveryMipAndLayer) {

@@ -39,7 +39,6 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     want12.timelineSemaphore = VK_TRUE;
     want12.scalarBlockLayout = has12.scalarBlockLayout;
     want12.shaderBufferInt64Atomics = has12.shaderBufferInt64Atomics;
-    want12.vulkanMemoryModel = has12.vulkanMemoryModel;
     VkPhysicalDeviceVulkan11Features want11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
                                             .pNext = &want12};
     want11.shaderDrawParameters = has11.shaderDrawParameters;
