@@ -1,29 +1,29 @@
 // SPDX-License-Identifier: MIT
+// Height images come as PNG files; colour images give their mean.
 
 #include "scene/heights.h"
 
 #include "image/png_file.h"
 
-#include "base/format.h"
-
 namespace kiln::scene {
 
 Result<sdf::HeightGrid> load_heights(const std::string& path) {
     const auto pixels = image::read_png(path);
-    if (!pixels)
-        return Error{pixels.error().message + "; name a PNG image, relative to the scene file", ErrorKind::Input};
-    if (pixels->width < 2 || pixels->height < 2)
-        return Error{
-            formatted("{}: {} by {} pixels; a heightfield needs 2 by 2 at least", path, pixels->width, pixels->height),
-            ErrorKind::Input};
-    sdf::HeightGrid grid;
-    grid.columns = pixels->width;
-    grid.rows = pixels->height;
+    if (!pixels) return pixels.error();
+    if (pixels->width < 2 || pixels->height < 2) {
+        return Error{path + ": a height image needs at least 2 x 2 pixels", ErrorKind::Input};
+    }
+    sdf::HeightGrid grid{pixels->width, pixels->height, {}};
+    const int colors = pixels->channels >= 3 ? 3 : 1;
+    const float white = float((1 << pixels->bits) - 1) * float(colors);
     grid.values.reserve(size_t(grid.columns) * size_t(grid.rows));
-    // Grey as it stands; of colours the first channel, red.
-    const float white = pixels->bits == 16 ? 65535.0f : 255.0f;
-    for (int y = 0; y < grid.rows; ++y)
-        for (int x = 0; x < grid.columns; ++x) grid.values.push_back(float(pixels->at(x, y, 0)) / white);
+    for (int y = 0; y < pixels->height; ++y) {
+        for (int x = 0; x < pixels->width; ++x) {
+            float sum = 0;
+            for (int c = 0; c < colors; ++c) sum += float(pixels->at(x, y, c));
+            grid.values.push_back(sum / white);
+        }
+    }
     return grid;
 }
 
