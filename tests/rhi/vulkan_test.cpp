@@ -268,6 +268,27 @@ TEST_F(VulkanGpu, LaterWritesOfOneFrameWin) {
     d.destroy(back);
 }
 
+// destroy() may come while the GPU still works with the object, and ahead of the submit that carries a queue write.
+TEST_F(VulkanGpu, WhatIsDestroyedWhileInUseLivesOn) {
+    Device& d = *device_;
+    const BufferHandle big = must(d.create_buffer({.size = 64 << 20, .label = "big"}));
+    auto e = d.create_encoder("long");
+    for (uint32_t i = 0; i < 8; ++i) {
+        e->clear_buffer(big, 0, kWholeSize, i);
+        barrier(*e, {.buffer = big, .before = Access::CopyWrite, .after = Access::CopyWrite});
+    }
+    const SubmitId id = must(d.submit(std::move(e)));
+    d.destroy(big);
+    EXPECT_EQ(d.live_handle_count(), 0u);
+    must(d.submit(d.create_encoder("collects")));
+    must(d.wait(id));
+
+    const BufferHandle written = must(d.create_buffer({.size = 64, .label = "written"}));
+    must(d.write_buffer(written, 0, bytes_of(std::vector<uint32_t>(16, 1))));
+    d.destroy(written);
+    must(d.wait(must(d.submit(d.create_encoder("carries the write")))));
+}
+
 TEST_F(VulkanGpu, TimestampsRiseAndStayInsideTheWait) {
     Device& d = *device_;
     if (!d.caps().timestamp) GTEST_SKIP() << "no timestamps";
@@ -340,8 +361,9 @@ TEST_F(VulkanGpu, TriangleStandsUprightInItsCorner) {
     must(d.write_buffer(points, 0, bytes_of(vertices)));
 
     auto e = d.create_encoder("triangle");
-    barrier(*e, {.texture = color, .after = Access::ColorWrite});
-    barrier(*e, {.texture = depth, .after = Access::DepthWrite});
+    const Barrier both[] = {{.texture = color, .after = Access::ColorWrite},
+                            {.texture = depth, .after = Access::DepthWrite}};
+    e->barrier(BarrierKeyForTests::key(), both);
     const ColorAttachment attachments[] = {{.view = d.whole_view(color), .clear = {0, 0, 1, 1}}};
     RenderPass& pass =
         e->begin_render({.colors = attachments, .depth = {.view = d.whole_view(depth)}, .label = "triangle"});
