@@ -48,7 +48,7 @@ inline constexpr int kMaxParams = 12;  ///< most numbers any shape or warp has
 struct Shape {
     uint16_t kind = 0;
     std::array<float, kMaxParams> params{};
-    std::string data;
+    std::string data{};
     friend bool operator==(const Shape&, const Shape&) = default;
 };
 
@@ -64,35 +64,35 @@ struct Warp {
 struct Node {
     enum class Kind : uint8_t { Shape, Object, Fold };
     Kind kind = Kind::Shape;
-    Shape shape;
-    ObjectId object;
+    Shape shape{};
+    ObjectId object{};
     Op op = Op::Union;                    ///< Fold: combines the children from left to right (never Paint)
     float blend_radius = 0;               ///< Fold: in the node's own units
     float material_blend_radius = -1;     ///< Fold: likewise, for materials; negative: same as blend_radius
-    std::vector<uint32_t> children;       ///< Fold: indices into Object::nodes
-    Transform transform;
-    std::vector<Warp> domain;
-    MaterialId material;                  ///< none: the parent's
+    std::vector<uint32_t> children{};     ///< Fold: indices into Object::nodes
+    Transform transform{};
+    std::vector<Warp> domain{};
+    MaterialId material{};                ///< none: the parent's
     friend bool operator==(const Node&, const Node&) = default;
 };
 
 /// A reusable tree; nodes[0] is the root. Children always have higher indices than their parent.
 struct Object {
-    std::string name;
-    std::vector<Node> nodes;
+    std::string name{};
+    std::vector<Node> nodes{};
     friend bool operator==(const Object&, const Object&) = default;
 };
 
 /// One entry of the world's ordered list. `node.kind` is Shape or Object.
 struct Edit {
-    std::string name;                     ///< the scene file's `id`; unique in a world, made up when empty
-    Node node;
+    std::string name{};                   ///< the scene file's `id`; unique in a world, made up when empty
+    Node node{};
     Op op = Op::Union;
     float blend_radius = 0;               ///< world metres; the |a − b| where blending begins
     float material_blend_radius = -1;     ///< world metres; negative: same as blend_radius
     bool dynamic = false;                 ///< hint: moves often
     bool hidden = false;                  ///< kept in the list, acts on nothing
-    std::string group;
+    std::string group{};
     friend bool operator==(const Edit&, const Edit&) = default;
 };
 

@@ -99,8 +99,8 @@ constexpr Box3 box_intersection(const Box3& a, const Box3& b) { return {max(a.mi
 
 /// local -> parent: position + rotation · (scale ∘ local). Every scale > 0.
 struct Transform {
-    vec3 position;
-    quat rotation;
+    vec3 position{};
+    quat rotation{};
     vec3 scale{1, 1, 1};
     friend bool operator==(const Transform&, const Transform&) = default;
 };

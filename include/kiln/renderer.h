@@ -37,7 +37,7 @@ struct Light {
     Kind kind = Kind::Directional;
     vec3 color{1, 1, 1};
     vec3 direction{-0.4f, -1, -0.3f};   ///< Directional, Spot: where the light goes; any length > 0
-    vec3 position;                      ///< Point, Spot
+    vec3 position{};                    ///< Point, Spot
     float illuminance = 3;              ///< Directional
     float angular_diameter_deg = 0.53f; ///< Directional: disc seen from the ground; 0 is a hard shadow
     float intensity = 20;               ///< Point, Spot

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// kiln::render_reference: the CPU path tracer of render/reference.h on the exact edits of a frame.
+
+#include "scene/exact.h"
+
+#include "field/field.h"
+#include "render/lib/color.gpu.h"
+#include "render/lib/pack.h"
+#include "render/lib/tonemap.gpu.h"
+#include "render/reference.h"
+
+#include <kiln/renderer.h>
+
+#include <chrono>
+
+namespace kiln {
+
+Result<Picture> render_reference(const Frame& frame, const RenderSettings& settings, int samples, RenderStats* stats) {
+    if (samples < 1) return Error{"render_reference: samples must be 1 or more", ErrorKind::Usage};
+    if (settings.width < 1 || settings.height < 1 || settings.width > 16384 || settings.height > 16384)
+        return Error{"render_reference: width and height must be from 1 to 16384", ErrorKind::Usage};
+    if (settings.view != View::Shaded)
+        return Error{"the reference draws the shaded view only; leave --view out", ErrorKind::Usage};
+    const auto start = std::chrono::steady_clock::now();
+    const sdf::Program& program = frame.field->program();
+    const scene::ExactField exact(program);
+    render::ReferenceField field;
+    field.distance = [&](dvec3 p) { return exact.distance(p); };
+    field.material = [&](dvec3 p) {
+        const MaterialId id = exact.sample({float(p.x), float(p.y), float(p.z)}).material;
+        return frame.materials[sdf::material_number(id)];
+    };
+    field.bounds = program.bounds;
+    if (program.unbounded) {
+        constexpr float inf = std::numeric_limits<float>::infinity();
+        field.bounds = {{-inf, -inf, -inf}, {inf, inf, inf}};
+    } else if (!field.bounds.empty()) {
+        float reach = 0;  // smooth unions bulge beyond their operands
+        for (const sdf::EditSpan& e : program.edits) reach = std::max(reach, e.reach);
+        field.bounds = field.bounds.inflated(reach);
+    }
+    const render::ReferencePicture traced =
+        render::render_reference(field, frame.lights, render::shade::sky_params(frame.environment), frame.camera,
+                                 {.width = settings.width, .height = settings.height, .samples = samples});
+    Picture out;
+    out.width = traced.width;
+    out.height = traced.height;
+    out.rgba = traced.rgba;
+    out.depth = traced.depth;
+    out.srgb.resize(out.rgba.size());
+    for (size_t i = 0; i + 3 < out.rgba.size(); i += 4) {
+        const float e = frame.camera.exposure;
+        const auto shown = render::shade::tone_map(uint32_t(frame.camera.tone_map),
+                                                   {out.rgba[i] * e, out.rgba[i + 1] * e, out.rgba[i + 2] * e});
+        const float channels[3] = {shown.x, shown.y, shown.z};
+        for (size_t k = 0; k < 3; ++k)
+            out.srgb[i + k] = uint8_t(render::shade::byte_from_unit(render::shade::srgb_from_linear(channels[k])));
+        out.srgb[i + 3] = 255;
+    }
+    if (stats) {
+        *stats = {};
+        stats->device = "CPU path tracer, exact edits";
+        stats->edits = int(program.edits.size());
+        stats->bricks = int(frame.field->stats().bricks);
+        stats->frame_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        stats->passes = {{"reference", stats->frame_ms}};
+        stats->coarsened = frame.coarsened;
+    }
+    return out;
+}
+
+}  // namespace kiln
