@@ -2,6 +2,7 @@
 #include "render/frame.h"
 
 #include "base/format.h"
+#include "render/lib/pack.h"
 
 #include <cmath>
 
@@ -10,13 +11,8 @@ namespace kiln::render {
 namespace {
 
 constexpr int kLargestSide = 16384;
-constexpr float kRadians = 0.017453292519943295f;
 
-vec4 with(vec3 v, float w) { return {v.x, v.y, v.z, w}; }
 bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
-
-// Any unit vector across `v`.
-vec3 across(vec3 v) { return normalize(cross(v, std::fabs(v.y) < 0.9f ? vec3{0, 1, 0} : vec3{1, 0, 0})); }
 
 }  // namespace
 
@@ -53,16 +49,8 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.eye_part_x = part[0], p.eye_part_y = part[1], p.eye_part_z = part[2];
     p.distance_scale = field.distance_scale();
 
-    const vec3 forward = normalize(look);
-    const vec3 side = cross(forward, camera.up);
-    const vec3 right = dot(side, side) > 1e-12f * dot(camera.up, camera.up) ? normalize(side) : across(forward);
-    const float half_height = std::tan(0.5f * camera.fov_y_deg * kRadians);
-    const float half_width = half_height * float(width) / float(height);
-    p.camera.eye = with(camera.position, 0.0f);
-    p.camera.right = with(right * half_width, 1.0f / float(width));
-    p.camera.up = with(cross(right, forward) * half_height, 1.0f / float(height));
-    p.camera.forward = with(forward, 0.0f);
-    p.pixel_angle = 2.0f * half_height / float(height);
+    p.camera = shade::camera_params(camera, width, height);
+    p.pixel_angle = 2.0f * length({p.camera.up.x, p.camera.up.y, p.camera.up.z}) / float(height);
 
     p.width = p.tile_width = width;
     p.height = p.tile_height = height;

@@ -4,6 +4,8 @@
 #include "base/assert.h"
 #include "base/format.h"
 #include "base/log.h"
+#include "base/parallel_for.h"
+#include "field/host_bricks.h"
 #include "render/graph_runner.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/passes.h"
@@ -11,7 +13,7 @@
 #include <kiln/shapes.h>
 
 #include <algorithm>
-#include <bit>
+#include <chrono>
 #include <cstring>
 
 namespace kiln::render {
@@ -121,7 +123,7 @@ void GpuField::drop_atlas() {
     }
 }
 
-Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, bool storage) {
+Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker baker) {
     drop_atlas();
     const uint32_t side = std::min(device_->limits().max_texture_3d, rhi::kMaxTexture3d) / field::kBrickTexels;
     bricks_x_ = 32;  // a multiple of the bricks of a copy group, so that most copies are whole groups
@@ -142,14 +144,15 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, bool stora
         {.dimension = rhi::Dimension::D3,
          .format = format,
          .size = size,
-         .usage = TextureUsage::Sampled | TextureUsage::CopySrc | (storage ? TextureUsage::Storage : TextureUsage::CopyDst),
+         .usage = TextureUsage::Sampled | TextureUsage::CopySrc | (baker == Baker::Storage ? TextureUsage::Storage : TextureUsage::CopyDst),
          .label = "atlas distances"});
     if (!distances) return distances.error();
     distances_ = *distances;
     auto materials = device_->create_texture({.dimension = rhi::Dimension::D3,
                                               .format = rhi::Format::R32Uint,
                                               .size = {size.width / 2, size.height, size.depth},
-                                              .usage = TextureUsage::Sampled | TextureUsage::Storage | TextureUsage::CopySrc,
+                                              .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
+                                                       (baker == Baker::Host ? TextureUsage::CopyDst : TextureUsage::Storage),
                                               .label = "atlas materials"});
     if (!materials) return materials.error();
     materials_ = *materials;
@@ -158,7 +161,7 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, bool stora
     if (!palettes) return palettes.error();
     palettes_ = *palettes;
     format_ = format;
-    storage_ = storage;
+    baker_ = baker;
     return {};
 }
 
@@ -188,14 +191,15 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     return out;
 }
 
-Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_copy) {
+Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker baker) {
     KILN_ASSERT(next != nullptr);
     bricks_baked_ = 0;
     bake_ms_ = 0;
     const rhi::Format format =
         next->options().format == field::DistanceFormat::Half ? rhi::Format::R16Float : rhi::Format::R8Snorm;
-    const bool storage = !by_copy && device_->caps().storage_r16f;
-    const bool same_atlas = distances_ && format == format_ && storage == storage_ &&
+    if (baker == Baker::Auto) baker = device_->info().kind == rhi::DeviceKind::Cpu ? Baker::Host : Baker::Storage;
+    if (baker == Baker::Storage && !device_->caps().storage_r16f) baker = Baker::Copy;
+    const bool same_atlas = distances_ && format == format_ && baker == baker_ &&
                             next->slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
     const bool here = field_ && same_atlas && next->revision() == field_->revision();
     if (here) return {};
@@ -245,8 +249,8 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_
         // A growing world gets half as much again, where that fits.
         const uint32_t wanted = next->slot_count();
         const uint32_t roomy = distances_ ? wanted + wanted / 2 : wanted;
-        auto made = make_atlas(std::max(roomy, 1u), format, storage);
-        if (!made && roomy != wanted) made = make_atlas(std::max(wanted, 1u), format, storage);
+        auto made = make_atlas(std::max(roomy, 1u), format, baker);
+        if (!made && roomy != wanted) made = make_atlas(std::max(wanted, 1u), format, baker);
         if (!made) {
             drop_atlas();
             return fail(made.error());
@@ -262,11 +266,12 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, bool by_
         }
     }
     std::sort(slots.begin(), slots.end());
-    if (auto r = bake(slots, !storage); !r) return fail(r.error());
+    if (auto r = baker == Baker::Host ? bake_on_host(slots) : bake(slots); !r) return fail(r.error());
     return {};
 }
 
-Result<void> GpuField::bake(std::span<const uint32_t> slots, bool by_copy) {
+Result<void> GpuField::bake(std::span<const uint32_t> slots) {
+    const bool by_copy = baker_ == Baker::Copy;
     bricks_baked_ = uint32_t(slots.size());
     if (slots.empty()) return {};
     const Kernel* const kernels[] = {&bake_kernel(format_, by_copy, use_)};
@@ -293,6 +298,53 @@ Result<void> GpuField::bake(std::span<const uint32_t> slots, bool by_copy) {
             bake_ms_ += times->total_ms;
         }
     }
+    return {};
+}
+
+Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
+    bricks_baked_ = uint32_t(slots.size());
+    const auto start = std::chrono::steady_clock::now();
+    const bool half = format_ == rhi::Format::R16Float;
+    const size_t code_bytes = rhi::bytes_per_texel(format_);
+    const float voxels_per_metre = 1.0f / field_->grid().voxel_size;
+    for (size_t at = 0; at < slots.size(); at += kJobsPerSlice) {
+        const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
+        std::vector<std::byte> codes(packed_bytes(slice.size(), 8 * code_bytes));
+        std::vector<std::byte> words(packed_bytes(slice.size(), 16));
+        std::vector<uint32_t> palettes(slice.size() * field::kPaletteSize);
+        parallel_for(int(slice.size()), field_->options().workers, [&](int i) {
+            const size_t job = size_t(i);
+            const field::BrickRecord& record = field_->records()[slice[job]];
+            field::BrickTexels texels;
+            field::bake_brick(*field_, {slice[job], {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count},
+                              texels);
+            for (size_t row = 0; row < 64; ++row) {
+                std::byte* const to = codes.data() + packed_at(job, row, 8 * code_bytes);
+                for (size_t x = 0; x < 8; ++x) {
+                    const float d_voxels = texels.distance[row * 8 + x] * voxels_per_metre;
+                    const uint32_t code = half ? field::half_code(d_voxels) : field::snorm8_code(d_voxels);
+                    std::memcpy(to + x * code_bytes, &code, code_bytes);
+                }
+                std::memcpy(words.data() + packed_at(job, row, 16), texels.material + row * 8, 16);
+            }
+            std::copy_n(texels.palette, field::kPaletteSize, palettes.begin() + ptrdiff_t(job) * field::kPaletteSize);
+        });
+        // Palettes of slots that follow each other in one write.
+        for (size_t i = 0; i < slice.size();) {
+            size_t n = 1;
+            while (i + n < slice.size() && slice[i + n] == slice[i] + n) ++n;
+            const auto run = std::span(palettes).subspan(i * field::kPaletteSize, n * field::kPaletteSize);
+            if (auto r = device_->write_buffer(palettes_, uint64_t{slice[i]} * field::kPaletteSize * 4, bytes_of(run)); !r) return r;
+            i += n;
+        }
+        Graph graph(*runner_);
+        FieldHandles f = import(graph);
+        store_bricks(graph, f, slice, codes, words, bricks_x_ | bricks_y_ << 16, format_);
+        graph.output(f.distances, rhi::Access::SampledReadCompute);
+        graph.output(f.materials, rhi::Access::SampledReadCompute);
+        if (auto submit = runner_->execute(graph); !submit) return submit.error();
+    }
+    bake_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return {};
 }
 

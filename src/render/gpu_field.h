@@ -19,6 +19,14 @@ struct FieldHandles {
     Image distances, materials;
 };
 
+// Who bakes, and how the distances get into the atlas.
+enum class Baker : uint8_t {
+    Auto,     // Storage where the device can; Host on software devices, whose shaders run many times slower than our SIMD
+    Storage,  // the GPU, to a storage texture (Copy where the device has none of the format)
+    Copy,     // the GPU, to a buffer that is copied
+    Host,     // the CPU; texels are copied
+};
+
 class GpuField {
 public:
     explicit GpuField(Runner& runner);
@@ -26,9 +34,8 @@ public:
     GpuField(const GpuField&) = delete;
     GpuField& operator=(const GpuField&) = delete;
 
-    // Makes the GPU's copy that of `field`: uploads, bakes, and waits for nothing. `by_copy`: distances go through a buffer
-    // even where the device could store them directly. OutOfMemory, with the number of bytes, when the atlas does not fit.
-    Result<void> update(std::shared_ptr<const field::Field> field, bool by_copy);
+    // Makes the GPU's copy that of `field`. OutOfMemory, with the number of bytes, when the atlas does not fit.
+    Result<void> update(std::shared_ptr<const field::Field> field, Baker baker = Baker::Auto);
 
     FieldHandles import(Graph& graph) const;
 
@@ -44,7 +51,7 @@ public:
     uint32_t program_count() const { return program_count_; }
     uint64_t atlas_bytes() const;
     uint32_t bricks_baked() const { return bricks_baked_; }  // by the last update()
-    double bake_ms() const { return bake_ms_; }              // GPU time of the last update(); 0 when nothing was baked
+    double bake_ms() const { return bake_ms_; }              // GPU time of the last update() (Host: wall time); 0: nothing was baked
     Result<uint32_t> dropped_materials();                    // that found no place in a palette of 16, so far; waits
 
     // What is stored, for tests: distance codes (16 or 8 bits each) and material words of a brick, in order x, y, z.
@@ -62,9 +69,10 @@ private:
     Result<void> reserve(Storage& storage, std::string_view name, uint64_t bytes, bool& kept);
     Result<void> write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes, std::span<const std::byte> old);
     Result<void> store(Storage& storage, std::string_view name, std::span<const std::byte> bytes, std::span<const std::byte> old);
-    Result<void> make_atlas(uint32_t slots, rhi::Format format, bool storage);
+    Result<void> make_atlas(uint32_t slots, rhi::Format format, Baker baker);
     void drop_atlas();
-    Result<void> bake(std::span<const uint32_t> slots, bool by_copy);
+    Result<void> bake(std::span<const uint32_t> slots);
+    Result<void> bake_on_host(std::span<const uint32_t> slots);
     std::vector<sdf::Instruction> outside_code();
 
     Runner* runner_;
@@ -75,7 +83,7 @@ private:
     rhi::BufferHandle palettes_, dropped_;
     rhi::TextureHandle distances_, materials_;
     rhi::Format format_ = rhi::Format::Undefined;
-    bool storage_ = false;  // the atlas of distances is a storage texture
+    Baker baker_ = Baker::Auto;
     uint32_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
     bool outside_is_plane_ = false;

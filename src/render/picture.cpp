@@ -2,6 +2,9 @@
 #include "render/picture.h"
 
 #include "base/assert.h"
+#include "base/format.h"
+#include "image/exr_file.h"
+#include "image/png_file.h"
 
 #include <bit>
 #include <cstring>
@@ -42,5 +45,14 @@ void place_tile(Picture& picture, int x, int y, int width, int height, std::span
 }
 
 }  // namespace render
+
+Result<void> Picture::save(const std::string& path) const {
+    if (path.ends_with(".png")) return image::write_png(path, width, height, srgb);
+    if (!path.ends_with(".exr")) {
+        return Error{formatted("{}: a picture's name ends in .png or .exr", path), ErrorKind::Usage};
+    }
+    if (view == View::Depth) return image::write_exr_depth(path, width, height, depth);
+    return image::write_exr(path, width, height, 4, rgba);
+}
 
 }  // namespace kiln

@@ -141,7 +141,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
-    if (auto updated = field->update(frame.field, settings.atlas_by_copy); !updated) return updated.error();
+    if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated) return updated.error();
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(settings), settings.view)); !warm) return warm.error();
 
     auto params = frame_params(frame, settings, *field);

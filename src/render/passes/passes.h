@@ -20,6 +20,13 @@ extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShad
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy,
                  const TapeUse& use);
 
+// Texels made elsewhere into the atlas. Row r (y + 8 z) of job i's brick is at packed_at(i, r, bytes of a row) of `codes` and `words`:
+// rows of 256 bytes, as many bricks side by side as fit, so that every device can copy them.
+size_t packed_at(size_t job, size_t row, size_t row_bytes);
+size_t packed_bytes(size_t jobs, size_t row_bytes);
+void store_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, std::span<const std::byte> codes,
+                  std::span<const std::byte> words, uint32_t atlas_bricks_x_y, rhi::Format format);
+
 const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
 
 // What every pass of one tile reads.
