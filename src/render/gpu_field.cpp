@@ -217,9 +217,13 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     const auto code = [](const field::Field& f) { return f.code(); };
     std::vector<sdf::Instruction> programs = next->program().code;
     program_count_ = uint32_t(programs.size());
-    if (device_->info().kind == rhi::DeviceKind::Cpu) use_ = both(tape_use(programs), specialised_once_ ? use_ : TapeUse{0, 0, 0, 1});
-    specialised_once_ = true;
     const std::vector<sdf::Instruction> outside = outside_code();
+    if (device_->info().kind == rhi::DeviceKind::Cpu) {
+        const TapeUse none{0, 0, 0, 1};
+        use_ = both(tape_use(programs), specialised_once_ ? use_ : none);
+        outside_use_ = both(tape_use(outside), specialised_once_ ? outside_use_ : none);
+        specialised_once_ = true;
+    }
     outside_count_ = uint32_t(outside.size());
     programs.insert(programs.end(), outside.begin(), outside.end());
 

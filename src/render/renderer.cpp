@@ -55,7 +55,7 @@ struct Renderer::Impl {
         in.exact = settings.analytic || field->leaves_grid();
         // A lone half-space has no shadow of its own to cast.
         in.shadow_exact = settings.analytic || (field->leaves_grid() && !field->outside_is_plane());
-        in.use = field->use();
+        in.use = field->use(!settings.analytic);
         return in;
     }
     void add_times(const FrameTimes& times);

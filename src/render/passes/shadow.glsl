@@ -123,12 +123,13 @@ void main() {
             vec2 on_disc = shadow_sub_disc(part_index, parts, 0.0);
             vec3 l = shadow_direction(light.l, light.tan_radius, on_disc);
             if (dot(l, surface.normal) <= 0.0) continue;
-            // Beyond the grid is only what code describes; bricks cast no shadow from there.
+            // Beyond the grid is only what code describes; it is looked at for some grid sizes.
             float t_in;
             float t_out;
             grid_stretch(texel_ray(shadow_whole, p, l), t_in, t_out);
+            vec3 grid_size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
             bool beyond = frame.outside_count != 0u || (frame.flags & kFrameUnpruned) != 0u;
-            float t_last = min(light.distance / h, beyond ? kFarVoxels : t_out + 2.0 * float(kBrickVoxels));
+            float t_last = min(light.distance / h, max(t_out, 0.0) + (beyond ? 16.0 * length(grid_size) : 2.0 * float(kBrickVoxels)));
             fractions[channel] += shadow_visible(p, l, light.tan_radius * inversesqrt(float(parts)), ShadowMarch(0.5, t_last, 0.25, kShadowSteps)) / float(parts);
         }
     }
