@@ -56,7 +56,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.height = p.tile_height = height;
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
               (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
-              (field.outside_is_plane() ? kFrameOutsidePlane : 0u);
+              (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
@@ -110,7 +110,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.push_back(&kView);
         return out;
     }
-    out.push_back(in.shadow_exact ? &specialised(kShadowExact, in.use) : &kShadow);
+    out.push_back(in.exact ? &specialised(kShadowExact, in.use) : &kShadow);
     out.push_back(&kLight);
     out.push_back(&kTonemap);
     return out;

@@ -33,13 +33,6 @@ std::span<const std::byte> bytes_of(const T& range) {
 
 uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
 
-// Is all that the edit can change inside the grid? (An intersect takes away what is far from it.)
-bool stays_in(const sdf::EditSpan& edit, const Box3& grid) {
-    const Box3 b = edit.bounds.inflated(edit.reach);
-    return edit.op != Op::Intersect && grid.min.x <= b.min.x && grid.min.y <= b.min.y && grid.min.z <= b.min.z && b.max.x <= grid.max.x &&
-           b.max.y <= grid.max.y && b.max.z <= grid.max.z;
-}
-
 }  // namespace
 
 GpuField::GpuField(Runner& runner) : runner_(&runner), device_(&runner.device()) {}
@@ -165,29 +158,29 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
     return {};
 }
 
-// Edits that reach out of the grid, as one program; nothing when none does or the world is empty there.
+// The unbounded edits, as one program; nothing when none of them adds. (An intersect takes away what is far from it: unbounded.)
 std::vector<sdf::Instruction> GpuField::outside_code() {
     const sdf::Program& program = field_->program();
-    const field::GridParams g = field_->grid();
-    const float cell = g.voxel_size * float(field::kBrickVoxels);
-    const Box3 grid{{float(g.cell_x) * cell, float(g.cell_y) * cell, float(g.cell_z) * cell},
-                    {float(g.cell_x + g.size_x) * cell, float(g.cell_y + g.size_y) * cell, float(g.cell_z + g.size_z) * cell}};
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
     int edits = 0;
     bool adds = false;
-    bool straight = true;  // only what keeps a half-space one
+    bool concave = true;
     for (const sdf::EditSpan& edit : program.edits) {
-        if (edit.count == 0 || stays_in(edit, grid)) continue;
-        ++edits;
+        if (edit.count == 0 || (edit.bounds.finite() && edit.op != Op::Intersect)) continue;
         adds = adds || edit.op == Op::Union;
-        for (const sdf::Instruction in : std::span(program.code).subspan(edit.first, edit.count)) {
-            out.push_back(in);
-            if (in.opcode() == sdf::Opcode::Shape) straight = straight && in.aux() == uint32_t(ShapeKind::Plane);
-            if (in.opcode() > sdf::Opcode::PointAffineOn && in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Combine) straight = false;
+        const auto code = std::span(program.code).subspan(edit.first, edit.count);
+        out.insert(out.end(), code.begin(), code.end());
+        if (edit.op == Op::Paint) continue;  // changes no distance
+        ++edits;
+        concave = concave && edit.op == Op::Union && (edits == 1 || edit.reach == 0);
+        for (const sdf::Instruction in : code) {
+            if (in.opcode() == sdf::Opcode::Shape) concave = concave && in.aux() == uint32_t(ShapeKind::Plane);
+            const bool keeps_straight = in.opcode() <= sdf::Opcode::PointAffineOn || in.opcode() == sdf::Opcode::Shape || in.opcode() == sdf::Opcode::Combine;
+            concave = concave && keeps_straight;
         }
     }
     if (!adds) out.clear();
-    outside_is_plane_ = adds && edits == 1 && straight;
+    outside_is_concave_ = adds && concave;
     return out;
 }
 

@@ -43,7 +43,8 @@ public:
     field::GridParams grid() const;                     // with the atlas layout filled in
     float distance_scale() const;                  // voxels a unit of the atlas
     bool leaves_grid() const { return outside_count_ != 0; }
-    bool outside_is_plane() const { return outside_is_plane_; }  // one half-space and nothing else leaves the grid
+    // Nothing but half-spaces, in hard unions, leaves the grid: along any ray the field there is a concave function.
+    bool outside_is_concave() const { return outside_is_concave_; }
     // What can occur on the tapes; everything, on GPUs. `outside`: on the tape of what leaves the grid alone.
     const TapeUse& use(bool outside) const { return outside ? outside_use_ : use_; }
     uint32_t params_first() const;                 // in the numbers buffer
@@ -87,7 +88,7 @@ private:
     Baker baker_ = Baker::Auto;
     uint32_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
-    bool outside_is_plane_ = false;
+    bool outside_is_concave_ = false;
     TapeUse use_, outside_use_;
     bool specialised_once_ = false;  // use_ only ever grows from there
     uint32_t bricks_baked_ = 0;

@@ -53,8 +53,6 @@ struct Renderer::Impl {
         TileInputs in;
         in.analytic = settings.analytic;
         in.exact = settings.analytic || field->leaves_grid();
-        // A lone half-space has no shadow of its own to cast.
-        in.shadow_exact = settings.analytic || (field->leaves_grid() && !field->outside_is_plane());
         in.use = field->use(!settings.analytic);
         return in;
     }

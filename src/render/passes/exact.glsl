@@ -6,6 +6,7 @@
 #include "render/passes/walk.glsl"
 
 const int kOutsideSteps = 1024;             // rays along the horizon end as sky
+const float kConcaveEnd = 1e12;             // voxels: where rays out of the grid end
 const float kExactStepVoxels = 0.00390625;  // least step: thinner features may be missed
 
 struct ExactHit {
@@ -44,6 +45,7 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
         uvec2 segment_code = code_of(w.state, w.slot);
         float d = tape_distance(segment_code.x, segment_code.y, origin + ray.direction * (w.t * h)) / h;
         hit.steps++;
+        bool concave = w.state == kSeenOutside && (frame.flags & kFrameOutsideConcave) != 0u;
         if (!bracketed && d <= 0.0) {
             if (fresh) {
                 // Solid from the segment's start: the ray's own start, or a rounding of where one segment meets the next.
@@ -72,23 +74,27 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
                 hit.slot = w.slot;
                 return hit;
             }
-            float share = clamp(positive_value / (positive_value - solid_value), 0.02, 0.98);
-            w.t = positive + (solid - positive) * share;
+            float share = positive_value / (positive_value - solid_value);
+            if (!concave) share = clamp(share, 0.02, 0.98);
+            // A little past the estimate, so that both ends close in.
+            w.t = min(positive + (solid - positive) * share + 5e-6, mix(positive, solid, 0.999));
             continue;
         }
-        float slope = (d - positive_value) / (w.t - positive);
-        bool straight = !fresh && w.state == kSeenOutside && (frame.flags & kFrameOutsidePlane) != 0u;
         fresh = false;
         positive = w.t;
         positive_value = d;
-        if (w.t >= w.segment_end || d * h >= kTapeEmptyTest || (straight && slope >= 0.0)) {
+        if (w.t >= w.segment_end || d * h >= kTapeEmptyTest) {
             w.t = max(w.t, w.segment_end);
             in_segment = false;
             continue;
         }
-        if (straight) {
-            // Just past the root of a straight line.
-            w.t = min((w.t - d / slope) * (1.0 + 1e-6) + 0.01, w.segment_end);
+        if (concave) {
+            // Concave and positive at both ends is positive between them; else the root is bracketed.
+            w.t = min(w.segment_end, kConcaveEnd);
+            if (positive >= w.t) {
+                w.t = w.segment_end;
+                in_segment = false;
+            }
             continue;
         }
         // Far from the grid nothing smaller than half a pixel is looked for.

@@ -44,7 +44,7 @@ KILN_CONST uint kFrameAccelerate = 1u;  // jump over empty cells
 KILN_CONST uint kFrameRays = 2u;        // rays come from the rays buffer instead of the camera
 KILN_CONST uint kFrameAnalytic = 4u;    // march the pruned programs of the cells
 KILN_CONST uint kFrameUnpruned = 8u;    // march the whole program
-KILN_CONST uint kFrameOutsidePlane = 16u;  // what leaves the grid is one half-space: its field is linear along a ray
+KILN_CONST uint kFrameOutsideConcave = 16u;  // half-spaces alone leave the grid: their field is concave along a ray
 
 // A ray given from outside (tests, queries): origin in voxels, unit direction.
 struct FrameRay {

@@ -41,7 +41,6 @@ struct TileInputs {
     rhi::Extent size;        // of the tile
     bool exact = false;      // some code is marched: analytic, or edits leave the grid
     bool analytic = false;   // … instead of the bricks
-    bool shadow_exact = false;  // exact code may cast shadows
     TapeUse use;
 };
 

@@ -14,8 +14,8 @@ Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surf
     const FieldHandles& f = in.field;
     std::vector<Use> uses{g.uniform(in.frame),    g.read(f.cells),    g.read(in.rays),       g.read(in.lights),
                           g.sampled(f.distances), g.read(visibility), g.read(surface.words), g.write(fractions)};
-    if (in.shadow_exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
-    g.dispatch(in.shadow_exact ? specialised(kShadowExact, in.use) : kShadow, in.size, uses, push);
+    if (in.exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
+    g.dispatch(in.exact ? specialised(kShadowExact, in.use) : kShadow, in.size, uses, push);
     return fractions;
 }
 

@@ -67,7 +67,8 @@ vec2 shadow_field(vec3 p) {
 #ifdef KILN_EXACT
     bool unpruned = (frame.flags & kFrameUnpruned) != 0u;
     uint state = unpruned ? kSeenProgram : (inside_grid ? kSeenPruned : kSeenOutside);
-    bool by_code = unpruned || (inside_grid ? occupied && (frame.flags & kFrameAnalytic) != 0u : frame.outside_count != 0u);
+    bool march_outside = frame.outside_count != 0u && (frame.flags & kFrameOutsideConcave) == 0u;
+    bool by_code = unpruned || (inside_grid ? occupied && (frame.flags & kFrameAnalytic) != 0u : march_outside);
     if (by_code) {
         uvec2 here_code = code_of(state, slot);
         float d = tape_distance(here_code.x, here_code.y, (vec3(shadow_whole) + p) * frame.grid.voxel_size) / frame.grid.voxel_size;
@@ -91,8 +92,18 @@ vec2 shadow_field(vec3 p) {
 
 #include "render/lib/soft_shadow.gpu.h"
 
+#ifdef KILN_EXACT
+// Half-spaces reach to infinity: they hide what of the disc is below their horizon, wherever the ray meets them.
+float above_horizons(vec3 p, vec3 l, float tan_radius, float distance_voxels) {
+    float far = min(distance_voxels, 1e5);
+    uvec2 outside = code_of(kSeenOutside, 0);
+    float height = tape_distance(outside.x, outside.y, (vec3(shadow_whole) + p + l * far) * frame.grid.voxel_size) / frame.grid.voxel_size;
+    return tan_radius > 0.0 ? disc_visible(height / (far * tan_radius)) : (height > 0.0 ? 1.0 : 0.0);
+}
+#endif
+
 // Wide discs are cut into parts, so that each part's cone stays in the band that bricks store.
-int disc_parts(float tan_radius) { return tan_radius < 0.02 ? 1 : (tan_radius < 0.1 ? 4 : 16); }
+int disc_parts(float tan_radius) { return tan_radius < 0.04 ? 1 : (tan_radius < 0.2 ? 4 : 9); }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -128,9 +139,15 @@ void main() {
             float t_out;
             grid_stretch(texel_ray(shadow_whole, p, l), t_in, t_out);
             vec3 grid_size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
-            bool beyond = frame.outside_count != 0u || (frame.flags & kFrameUnpruned) != 0u;
+            bool concave = frame.outside_count != 0u && (frame.flags & (kFrameOutsideConcave | kFrameUnpruned)) == kFrameOutsideConcave;
+            bool beyond = (frame.outside_count != 0u && !concave) || (frame.flags & kFrameUnpruned) != 0u;
             float t_last = min(light.distance / h, max(t_out, 0.0) + (beyond ? 16.0 * length(grid_size) : 2.0 * float(kBrickVoxels)));
-            fractions[channel] += shadow_visible(p, l, light.tan_radius * inversesqrt(float(parts)), ShadowMarch(0.5, t_last, 0.25, kShadowSteps)) / float(parts);
+            float tan_radius = light.tan_radius * inversesqrt(float(parts));
+            float fraction = shadow_visible(p, l, tan_radius, ShadowMarch(0.5, t_last, 0.25, kShadowSteps));
+#ifdef KILN_EXACT
+            if (concave && fraction > 0.0) fraction *= above_horizons(p, l, tan_radius, light.distance / h);
+#endif
+            fractions[channel] += fraction / float(parts);
         }
     }
     imageStore(visible_fractions, pixel, fractions);
