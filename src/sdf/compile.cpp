@@ -137,6 +137,12 @@ public:
                 }
             }
         }
+        // Where something is everywhere, bounded cuts and paint show outside the solids too.
+        for (const EditSpan& span : out_.edits) {
+            if (out_.unbounded && span.count > 0 && span.op != Op::Union && span.bounds.finite()) {
+                out_.bounds = box_union(out_.bounds, span.bounds.inflated(0.25f * span.reach));
+            }
+        }
         return {};
     }
 

@@ -82,7 +82,8 @@ struct Program {
     std::vector<float> params;
     std::vector<float> samples;     ///< numbers of sampled shapes
     std::vector<EditSpan> edits;    ///< same order as given; hidden edits have count 0 and empty bounds
-    Box3 bounds;                    ///< union of the finite edits' solids that add (union edits); empty when none
+    Box3 bounds;                    ///< what the finite edits can change: solids of unions, and of the others where something is
+                                    ///< unbounded; empty when none
     bool unbounded = false;         ///< some visible union edit has infinite bounds
 };
 
