@@ -242,7 +242,9 @@ TEST(SceneFile, EveryKeyOfTheTablesIsInTheDocumentation) {
         for (const sdf::KindRow& row : rows) {
             EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`"));
             for (const sdf::FieldRow& field : row.fields())
-                if (field.range != "internal") EXPECT_THAT(page, HasSubstr("`" + std::string(field.name) + "`")) << row.name;
+                if (field.range != "internal") {
+                    EXPECT_THAT(page, HasSubstr("`" + std::string(field.name) + "`")) << row.name;
+                }
         }
 }
 

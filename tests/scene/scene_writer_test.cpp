@@ -3,6 +3,7 @@
 
 #include "scene/bundled.h"
 #include "scene_text.h"
+#include "sdf/tables.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

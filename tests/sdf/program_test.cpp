@@ -258,7 +258,9 @@ TEST(Program, RepeatIsTheNearestOfAllCopiesAlsoOffCentreAndTurned) {
         // Farther than half a spacing the bound by boxes may be less; near the surface it is the distance.
         const double d = evaluate(view(*many), dvec3{p.x, p.y, p.z});
         EXPECT_LE(d, nearest + 1e-6);
-        if (nearest < 0.2) EXPECT_NEAR(d, nearest, 1e-6) << p.x << ' ' << p.y << ' ' << p.z;
+        if (nearest < 0.2) {
+            EXPECT_NEAR(d, nearest, 1e-6) << p.x << ' ' << p.y << ' ' << p.z;
+        }
         const vec3 q = p + r.point(0.1f);
         EXPECT_LE(std::abs(d - evaluate(view(*many), dvec3{q.x, q.y, q.z})), double(length(p - q)) * (1 + 1e-5) + 1e-6);
     }
