@@ -7,5 +7,9 @@ layout(set = 0, binding = 1, std430) buffer Next { uint groups[3]; } next;
 layout(push_constant) uniform Push { uint groups_x; } push;
 void main() {
     atomicAdd(counter.total, 1u);
-    if (gl_GlobalInvocationID.x == 0u) next.groups = uint[3](push.groups_x, 2u, 1u);
+    if (gl_GlobalInvocationID.x == 0u) {
+        next.groups[0] = push.groups_x;
+        next.groups[1] = 2u;
+        next.groups[2] = 1u;
+    }
 }
