@@ -184,6 +184,34 @@ TEST(ReferenceRay, HitsAreTheSameWithAndWithoutJumps) {
     }
 }
 
+// Rays all but parallel to the borders between bricks cross them over hundreds of voxels of t: where one brick says the ray has
+// left, the next must say it has come.
+TEST(ReferenceRay, RaysThatGlideAlongBrickBordersFindNoGap) {
+    worlds::World world{"plane", {worlds::edit(Plane{})}, {.voxel_size = 0.05f, .bounds = {{-2, -2, -2}, {2, 2, 2}}}};
+    world.edits[0].node.transform.rotation = axis_angle(normalize(vec3{1, 0, 0.2f}), 0.5f);
+    const HostBricks bricks = HostBricks::bake(world.field());
+    worlds::Random r(12);
+    int hits = 0;
+    for (int i = 0; i < 20000; ++i) {
+        const float drift = std::ldexp(r.in(-1, 1), -4 - r.below(20));
+        const vec3 d =
+            normalize(i % 2 == 0 ? vec3{drift, -1, 0.3f * r.in(-1, 1)} : vec3{drift, -1, drift * r.in(-1, 1)});
+        const float away = r.in(20, 200);
+        const vec3 target{7.0f * float(r.below(7) - 3), 0, r.in(-15, 15)};
+        const vec3 from{target.x - d.x * away * r.in(0.9f, 1.1f), target.y - d.y * away, target.z - d.z * away};
+        const ivec3 whole{int(std::floor(from.x)), int(std::floor(from.y)), int(std::floor(from.z))};
+        const TexelRay ray =
+            texel_ray(whole, {from.x - float(whole.x), from.y - float(whole.y), from.z - float(whole.z)}, d);
+        const ReferenceHit expected = reference_ray(bricks, ray, 1000);
+        const MarchHit got = bricks.march(ray, 0, 1000);
+        ASSERT_EQ(got.state, expected.state) << "ray " << i;
+        if (expected.state != kMarchHit) continue;
+        ASSERT_NEAR(double(got.t), expected.t, 1e-4) << "ray " << i;
+        ++hits;
+    }
+    EXPECT_GT(hits, 10000);
+}
+
 // The whole and fractional parts of an origin are one ray, however far away it starts.
 TEST(ReferenceRay, ARayIsAsExactFromFarAway) {
     const HostBricks bricks = HostBricks::bake(worlds::sphere_of(10).field());
