@@ -485,6 +485,10 @@ void Graph::draw_bytes(const RasterKernel& kernel, Targets targets, const Uses& 
         command.color_ids.push_back(c.image->id);
     }
     if (DepthUse& d = targets.depth; d.image) {
+        if (d.image->format != kernel.depth.format || (d.read_only && kernel.depth.write))
+            return error(formatted("pass '{}': the kernel {} depth of {}, the target is {}{}", pass.name,
+                                   kernel.depth.write ? "writes" : "tests", rhi::name(kernel.depth.format),
+                                   rhi::name(d.image->format), d.read_only ? ", read only" : ""));
         if (d.read_only ? !current(*d.image, "draw") : !bump(*d.image, "draw")) return;
         const bool loads = d.load == rhi::Load::Load || d.read_only;
         if (!touch(pass, d.image->id, d.range, d.read_only ? Access::DepthRead : Access::DepthWrite, loads, !loads))

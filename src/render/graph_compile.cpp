@@ -149,21 +149,26 @@ ClearCommand poison_of(const GraphResource& r, uint32_t id) {
     return c;
 }
 
-std::vector<GraphPass> with_poison(const std::vector<GraphResource>& resources, std::vector<GraphPass> passes) {
-    std::vector<GraphPass> out;
-    std::vector<uint8_t> seen(resources.size(), 0);
-    for (GraphPass& pass : passes) {
-        for (const GraphAccess& a : pass.accesses) {
-            const GraphResource& r = resources[a.resource];
-            if (!r.transient() || seen[a.resource]++) continue;
+void insert_poison(Plan& plan) {
+    std::vector<GraphPass> passes;
+    std::vector<uint32_t> recorded;
+    std::vector<uint8_t> seen(plan.resources.size(), 0);
+    for (size_t p = 0; p < plan.passes.size(); ++p) {
+        for (const GraphAccess& a : plan.passes[p].accesses) {
+            const GraphResource& r = plan.resources[a.resource];
+            if (!r.transient() || seen[a.resource]) continue;
+            seen[a.resource] = 1;
             GraphPass poison{.name = formatted("poison {}", r.name)};
             poison.accesses = {{a.resource, {0, r.mips, 0, r.layers()}, Access::CopyWrite, false, true}};
             poison.command = poison_of(r, a.resource);
-            out.push_back(std::move(poison));
+            passes.push_back(std::move(poison));
+            recorded.push_back(~0u);
         }
-        out.push_back(std::move(pass));
+        passes.push_back(std::move(plan.passes[p]));
+        recorded.push_back(plan.recorded[p]);
     }
-    return out;
+    plan.passes = std::move(passes);
+    plan.recorded = std::move(recorded);
 }
 
 // Level of every pass: the level of the pass before it, or one more if it touches what a pass of that level writes,
@@ -432,11 +437,12 @@ Result<Plan> Graph::compile(const CompileOptions& options) const {
     for (size_t p = 0; p < passes_.size(); ++p) {
         if (live[p]) {
             plan.passes.push_back(passes_[p]);
+            plan.recorded.push_back(uint32_t(p));
         } else {
             plan.culled.push_back(passes_[p].name);
         }
     }
-    if (options.poison) plan.passes = with_poison(plan.resources, std::move(plan.passes));
+    if (options.poison) insert_poison(plan);
     find_uses(plan);
     const std::vector<uint32_t> levels = find_levels(plan.resources, plan.passes);
     plan.levels.resize(levels.empty() ? 0 : levels.back() + 1);

@@ -36,6 +36,8 @@ GraphObjects::Key GraphObjects::key_of(const rhi::BufferDesc& d, uint64_t offset
 GraphObjects::~GraphObjects() {
     for (const auto& [key, g] : groups_) device_.destroy(g.handle);
     for (const auto& [key, v] : views_) device_.destroy(v.handle);
+    groups_.clear();
+    views_.clear();
     for (const auto& [key, s] : samplers_) device_.destroy(s.handle);
     for (const auto& [key, t] : placed_textures_) device_.destroy(t.handle);
     for (const auto& [key, b] : placed_buffers_) device_.destroy(b.handle);
@@ -267,6 +269,7 @@ Result<HistoryObjects*> GraphObjects::history(const GraphResource& like, const P
             } else if (rhi::info(like.format).core_storage || device_.caps().storage_r16f) {
                 usage |= U::Storage;
             }
+            if (like.format == rhi::Format::Rgba8Unorm || like.format == rhi::Format::Rgba16Float) usage |= U::Color;
             const auto texture = device_.create_texture(texture_desc(like, usage));
             if (!texture) return texture.error();
             made.textures[i] = *texture;

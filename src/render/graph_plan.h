@@ -57,6 +57,7 @@ struct PlanResource {
 struct Plan {
     std::vector<GraphResource> resources = {};  // copies without payloads, for text() and checks
     std::vector<GraphPass> passes = {};         // those that run, in order, including inserted ones
+    std::vector<uint32_t> recorded = {};        // of each, its index in Graph::passes(); ~0 for inserted ones
     std::vector<std::string> culled = {};       // names, in order of recording
     std::vector<PlanLevel> levels = {};
     std::vector<PlanBarrier> epilogue =
