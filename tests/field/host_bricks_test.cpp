@@ -7,6 +7,7 @@
 #include "sdf/eval.h"
 #include "worlds.h"
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -339,6 +340,7 @@ TEST(HostBricks, APaletteKeepsTheSixteenHeaviestAndCountsTheRest) {
         texels);
     EXPECT_EQ(texels.dropped, 9u);
     int named = 0;
+    std::vector<int> texels_of(64, 0);  // hard unions: a texel has one material
     for (int i = 0; i < 512; ++i) {
         const float p[3] = {float(i & 7) * 0.05f, float(i >> 3 & 7) * 0.05f, float(i >> 6) * 0.05f};
         float value;
@@ -348,6 +350,7 @@ TEST(HostBricks, APaletteKeepsTheSixteenHeaviestAndCountsTheRest) {
             EXPECT_EQ(texels.material[i], 0);
             continue;
         }
+        ++texels_of[mix.id0];
         for (int slot = 0; slot < 16; ++slot) {
             if (palette[slot] != mix.id0) continue;
             EXPECT_EQ(material_slot0(texels.material[i]), uint32_t(slot));
@@ -355,6 +358,14 @@ TEST(HostBricks, APaletteKeepsTheSixteenHeaviestAndCountsTheRest) {
         }
     }
     EXPECT_GT(named, 100);
+    int lightest_kept = 512, heaviest_left = 0;
+    for (int id = 0; id < 64; ++id) {
+        const bool kept = std::find(palette, palette + 16, uint32_t(id)) != palette + 16;
+        if (kept) lightest_kept = std::min(lightest_kept, texels_of[size_t(id)]);
+        if (!kept) heaviest_left = std::max(heaviest_left, texels_of[size_t(id)]);
+    }
+    EXPECT_GE(lightest_kept, heaviest_left);
+    EXPECT_GT(heaviest_left, 0);
 }
 
 TEST(HostBricks, FarEditsChangeNotOneBitOfABrick) {
