@@ -183,3 +183,14 @@ TEST(SoftShadow, PartsOfADiscMakeUpTheDisc) {
     }
     EXPECT_NEAR(seen, 0.25, 0.02);
 }
+
+// Far inside a shadow one ray proves that all of the disc is covered; a thin wall takes one ray and six to the rim.
+TEST(SoftShadow, DeepShadowsTakeOneRay) {
+    int samples = 0;
+    SoftShadow shadow{[&](vec3 p) {
+        ++samples;
+        return std::min(p.y, box_distance(p, {-50, 1, -50}, {50, 9, 50}));
+    }};
+    EXPECT_EQ(shadow.shadow_visible({0, 0, 0}, {0, 1, 0}, 0.1f, {1e-2f, 100, 1e-3f, 256}), 0);
+    EXPECT_LE(samples, 40);
+}
