@@ -37,20 +37,21 @@ TEST_P(EachBadText, IsRefusedWithItsPlace) {
 
 INSTANTIATE_TEST_SUITE_P(
     Json, EachBadText,
-    testing::Values(BadText{"", "f.json:1:1: ", "empty"}, BadText{"  \n ", "f.json:2:2: ", "empty"},
-                    BadText{"{\"a\": 1,\n}", "f.json:1:8: ", "comma"}, BadText{"[1, 2", "f.json:1:6: ", "file ends here"},
-                    BadText{"{\"a\": NaN}", "f.json:1:7: ", "finite"}, BadText{"{\"a\": -Infinity}", "f.json:1:7: ", "finite"},
-                    BadText{"{\"a\": 1e999}", "f.json:1:7: ", "too large"}, BadText{"[01]", "f.json:1:2: ", "leading 0"},
-                    BadText{"[1.]", "f.json:1:2: ", "digit"}, BadText{"[.5]", "f.json:1:2: ", "expected a value"},
-                    BadText{"[1e+]", "f.json:1:2: ", "digits after"}, BadText{"{\"a\": 1 // x\n}", "f.json:1:9: ", "no comments"},
-                    BadText{"{'a': 1}", "f.json:1:2: ", "double quotes"}, BadText{"{\"a\" 1}", "f.json:1:6: ", "':'"},
-                    BadText{"{\"a\": 1, \"a\": 2}", "f.json:1:10: a: ", "twice"},
-                    BadText{"{\"b\": [], \"c\": {\"a\": 1, \"a\": 2}}", "f.json:1:25: c.a: ", "twice"},
-                    BadText{"[1] 2", "f.json:1:5: ", "after the end"}, BadText{"[\"a\xff\"]", "f.json:1:4: ", "UTF-8"},
-                    BadText{"[\"\xc0\x80\"]", "f.json:1:3: ", "UTF-8"}, BadText{"[\"\xed\xa0\x80\"]", "f.json:1:3: ", "UTF-8"},
-                    BadText{"[\"a\nb\"]", "f.json:1:2: ", "closing quote"}, BadText{"[\"\\q\"]", "f.json:1:3: ", "escape"},
-                    BadText{"[\"\\u12\"]", "f.json:1:3: ", "hexadecimal"}, BadText{"[\"\\ud800\"]", "f.json:1:3: ", "surrogate"},
-                    BadText{"[\"é\", x]", "f.json:1:7: ", "found 'x'"}, BadText{"[\x01]", "f.json:1:2: ", "unreadable"}));
+    testing::Values(
+        BadText{"", "f.json:1:1: ", "empty"}, BadText{"  \n ", "f.json:2:2: ", "empty"},
+        BadText{"{\"a\": 1,\n}", "f.json:1:8: ", "comma"}, BadText{"[1, 2", "f.json:1:6: ", "file ends here"},
+        BadText{"{\"a\": NaN}", "f.json:1:7: ", "finite"}, BadText{"{\"a\": -Infinity}", "f.json:1:7: ", "finite"},
+        BadText{"{\"a\": 1e999}", "f.json:1:7: ", "too large"}, BadText{"[01]", "f.json:1:2: ", "leading 0"},
+        BadText{"[1.]", "f.json:1:2: ", "digit"}, BadText{"[.5]", "f.json:1:2: ", "expected a value"},
+        BadText{"[1e+]", "f.json:1:2: ", "digits after"}, BadText{"{\"a\": 1 // x\n}", "f.json:1:9: ", "no comments"},
+        BadText{"{'a': 1}", "f.json:1:2: ", "double quotes"}, BadText{"{\"a\" 1}", "f.json:1:6: ", "':'"},
+        BadText{"{\"a\": 1, \"a\": 2}", "f.json:1:10: a: ", "twice"},
+        BadText{"{\"b\": [], \"c\": {\"a\": 1, \"a\": 2}}", "f.json:1:25: c.a: ", "twice"},
+        BadText{"[1] 2", "f.json:1:5: ", "after the end"}, BadText{"[\"a\xff\"]", "f.json:1:4: ", "UTF-8"},
+        BadText{"[\"\xc0\x80\"]", "f.json:1:3: ", "UTF-8"}, BadText{"[\"\xed\xa0\x80\"]", "f.json:1:3: ", "UTF-8"},
+        BadText{"[\"a\nb\"]", "f.json:1:2: ", "closing quote"}, BadText{"[\"\\q\"]", "f.json:1:3: ", "escape"},
+        BadText{"[\"\\u12\"]", "f.json:1:3: ", "hexadecimal"}, BadText{"[\"\\ud800\"]", "f.json:1:3: ", "surrogate"},
+        BadText{"[\"é\", x]", "f.json:1:7: ", "found 'x'"}, BadText{"[\x01]", "f.json:1:2: ", "unreadable"}));
 
 TEST(JsonDocument, RemembersOrderPlacesAndPaths) {
     auto d = JsonDocument::parse("{\n  \"b\": 1,\n  \"a\": [true, {\"x y\": null}]\n}", "f");

@@ -15,7 +15,8 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const char* const kMaterials = "\"materials\": {\"clay\": {\"base_color\": [0.7, 0.3, 0.2]}, \"glass\": {\"opacity\": 0.5}}";
+const char* const kMaterials =
+    "\"materials\": {\"clay\": {\"base_color\": [0.7, 0.3, 0.2]}, \"glass\": {\"opacity\": 0.5}}";
 
 struct BadScene {
     std::string text;
@@ -52,87 +53,146 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{"{\"format\": 1, \"edits\": {}}", "edits: ", "an object", "an array"},
         BadScene{scene_with("3"), "edits[0]: ", "a number", "an object such as"},
         BadScene{scene_with("{}"), "edits[0]: ", "neither a shape nor an object", "\"shape\": \"sphere\""},
-        BadScene{scene_with("{\"shape\": \"spere\"}"), "edits[0].shape: ", "there is no shape \"spere\"", "did you mean \"sphere\"?"},
-        BadScene{scene_with("{\"shape\": \"mesh\", \"file\": \"a.obj\"}"), "edits[0].shape: ", "does not have the shape", "use one of"},
-        BadScene{scene_with("{\"shape\": \"expression\"}"), "edits[0].shape: ", "does not have the shape", "use one of"},
+        BadScene{scene_with("{\"shape\": \"spere\"}"), "edits[0].shape: ", "there is no shape \"spere\"",
+                 "did you mean \"sphere\"?"},
+        BadScene{scene_with("{\"shape\": \"mesh\", \"file\": \"a.obj\"}"),
+                 "edits[0].shape: ", "does not have the shape", "use one of"},
+        BadScene{scene_with("{\"shape\": \"expression\"}"), "edits[0].shape: ", "does not have the shape",
+                 "use one of"},
         BadScene{scene_with("{\"shape\": 5}"), "edits[0].shape: ", "5 is a number", "\"sphere\""},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": \"big\"}"), "edits[0].radius: ", "\"big\" is a string", "a number such as 0.5"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": null}"), "edits[0].radius: ", "null", "leave the key out"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": 0}"), "edits[0].radius: ", "0 is out of range", "greater than 0"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": -1}"), "edits[0].radius: ", "-1 is out of range", "greater than 0"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": 1e30}"), "edits[0].radius: ", "too large", "at most 1e+09 metres"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": \"big\"}"), "edits[0].radius: ", "\"big\" is a string",
+                 "a number such as 0.5"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": null}"), "edits[0].radius: ", "null",
+                 "leave the key out"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": 0}"), "edits[0].radius: ", "0 is out of range",
+                 "greater than 0"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": -1}"), "edits[0].radius: ", "-1 is out of range",
+                 "greater than 0"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": 1e30}"), "edits[0].radius: ", "too large",
+                 "at most 1e+09 metres"},
         BadScene{scene_with("{\"shape\": \"sphere\", \"radius\": 1e300}"), "edits[0].radius: ", "too large", "at most"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"raduis\": 1}"), "edits[0].raduis: ", "unknown key", "did you mean \"radius\"?"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"half_extents\": [1, 1, 1]}"), "edits[0].half_extents: ", "a sphere has no half_extents", "it has radius"},
-        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": [1, 1]}"), "edits[0].half_extents: ", "2 numbers", "must be 3"},
-        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": 1}"), "edits[0].half_extents: ", "a number", "3 numbers such as"},
-        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": [1, 0, 1]}"), "edits[0].half_extents[1]: ", "out of range", "greater than 0"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"raduis\": 1}"), "edits[0].raduis: ", "unknown key",
+                 "did you mean \"radius\"?"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"half_extents\": [1, 1, 1]}"),
+                 "edits[0].half_extents: ", "a sphere has no half_extents", "it has radius"},
+        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": [1, 1]}"), "edits[0].half_extents: ", "2 numbers",
+                 "must be 3"},
+        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": 1}"), "edits[0].half_extents: ", "a number",
+                 "3 numbers such as"},
+        BadScene{scene_with("{\"shape\": \"box\", \"half_extents\": [1, 0, 1]}"),
+                 "edits[0].half_extents[1]: ", "out of range", "greater than 0"},
         BadScene{scene_with("{\"shape\": \"prism\", \"sides\": 2.5}"), "edits[0].sides: ", "2.5", "whole number"},
-        BadScene{scene_with("{\"shape\": \"prism\", \"sides\": 65}"), "edits[0].sides: ", "65 is out of range", "[3, 64]"},
+        BadScene{scene_with("{\"shape\": \"prism\", \"sides\": 65}"), "edits[0].sides: ", "65 is out of range",
+                 "[3, 64]"},
         BadScene{scene_with("{\"shape\": \"heightfield\"}"), "edits[0]: ", "needs a \"file\"", "PNG"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"object\": \"a\"}"), "edits[0].object: ", "a shape and an object", "keep one"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"object\": \"a\"}"), "edits[0].object: ", "a shape and an object",
+                 "keep one"},
         BadScene{scene_with("{\"children\": []}"), "edits[0].children: ", "no children", "\"objects\""},
         BadScene{scene_with("{\"object\": \"a\"}"), "edits[0].object: ", "there is no object \"a\"", "there are none"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"material\": \"cla\"}", kMaterials), "edits[0].material: ", "no material \"cla\"", "did you mean \"clay\"?"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"op\": \"add\"}"), "edits[0].op: ", "\"add\" is not known", "\"subtract\""},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"op\": \"paint\"}"), "edits[0]: ", "paint without a material", "add \"material\""},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"blend_radius\": -0.1}"), "edits[0].blend_radius: ", "-0.1", "not be negative"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"position\": [0, 2e9, 0]}"), "edits[0].position[1]: ", "too large", "metres"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 0, 2]}"), "edits[0].rotation: ", "length 2", "must be 1"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 0, 0]}"), "edits[0].rotation: ", "length 0", "must be 1"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 1]}"), "edits[0].rotation: ", "3 numbers", "quaternion"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"scale\": [1, -1, 1]}"), "edits[0].scale[1]: ", "-1", "greater than 0"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"material\": \"cla\"}", kMaterials),
+                 "edits[0].material: ", "no material \"cla\"", "did you mean \"clay\"?"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"op\": \"add\"}"), "edits[0].op: ", "\"add\" is not known",
+                 "\"subtract\""},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"op\": \"paint\"}"), "edits[0]: ", "paint without a material",
+                 "add \"material\""},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"blend_radius\": -0.1}"), "edits[0].blend_radius: ", "-0.1",
+                 "not be negative"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"position\": [0, 2e9, 0]}"),
+                 "edits[0].position[1]: ", "too large", "metres"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 0, 2]}"), "edits[0].rotation: ", "length 2",
+                 "must be 1"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 0, 0]}"), "edits[0].rotation: ", "length 0",
+                 "must be 1"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"rotation\": [0, 0, 1]}"), "edits[0].rotation: ", "3 numbers",
+                 "quaternion"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"scale\": [1, -1, 1]}"), "edits[0].scale[1]: ", "-1",
+                 "greater than 0"},
         BadScene{scene_with("{\"shape\": \"sphere\", \"scale\": 1e9}"), "edits[0].scale: ", "1e+09", "between"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"hidden\": 1}"), "edits[0].hidden: ", "1 is a number", "true or false"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"hidden\": 1}"), "edits[0].hidden: ", "1 is a number",
+                 "true or false"},
         BadScene{scene_with("{\"shape\": \"sphere\", \"id\": \"\"}"), "edits[0].id: ", "empty id", "give it a name"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"id\": \"a\"}, {\"shape\": \"box\", \"id\": \"a\"}"), "edits[1].id: ", "edits[0] has this id", "choose another"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"rate\": 1}]}"), "edits[0].domain[0]: ", "\"warp\" is missing", "twist"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"twits\"}]}"), "edits[0].domain[0].warp: ", "there is no warp", "did you mean \"twist\"?"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"mirror\", \"axis\": \"w\"}]}"), "edits[0].domain[0].axis: ", "there is no axis", "x, y, z"},
-        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"repeat\", \"spacing\": [0.1, 0, 0]}]}"), "edits[0].domain[0]: ", "wider than the spacing", "larger spacing"},
-        BadScene{scene_with("{\"shape\": \"plane\", \"domain\": [{\"warp\": \"twist\", \"rate\": 1}]}"), "edits[0].domain[0]: ", "finite size", "bounded shape"},
-        BadScene{with_object("\"a\": {\"object\": \"a\"}"), "objects.a.object: ", "contains itself: a -> a", "take one"},
-        BadScene{with_object("\"a\": {\"children\": [{\"object\": \"b\"}]}, \"b\": {\"object\": \"a\"}"), "objects.b.object: ", "contains itself: a -> b -> a", "take one"},
-        BadScene{with_object("\"a\": {\"children\": [{\"shape\": \"sphere\", \"op\": \"union\"}]}"), "objects.a.children[0].op: ", "stands on the node with \"children\"", "move it"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"id\": \"a\"}, {\"shape\": \"box\", \"id\": \"a\"}"),
+                 "edits[1].id: ", "edits[0] has this id", "choose another"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"rate\": 1}]}"),
+                 "edits[0].domain[0]: ", "\"warp\" is missing", "twist"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"twits\"}]}"),
+                 "edits[0].domain[0].warp: ", "there is no warp", "did you mean \"twist\"?"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"mirror\", \"axis\": \"w\"}]}"),
+                 "edits[0].domain[0].axis: ", "there is no axis", "x, y, z"},
+        BadScene{scene_with("{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"repeat\", \"spacing\": [0.1, 0, 0]}]}"),
+                 "edits[0].domain[0]: ", "wider than the spacing", "larger spacing"},
+        BadScene{scene_with("{\"shape\": \"plane\", \"domain\": [{\"warp\": \"twist\", \"rate\": 1}]}"),
+                 "edits[0].domain[0]: ", "finite size", "bounded shape"},
+        BadScene{with_object("\"a\": {\"object\": \"a\"}"), "objects.a.object: ", "contains itself: a -> a",
+                 "take one"},
+        BadScene{with_object("\"a\": {\"children\": [{\"object\": \"b\"}]}, \"b\": {\"object\": \"a\"}"),
+                 "objects.b.object: ", "contains itself: a -> b -> a", "take one"},
+        BadScene{with_object("\"a\": {\"children\": [{\"shape\": \"sphere\", \"op\": \"union\"}]}"),
+                 "objects.a.children[0].op: ", "stands on the node with \"children\"", "move it"},
         BadScene{with_object("\"a\": {\"children\": []}"), "objects.a.children: ", "no children", "at least one"},
-        BadScene{with_object("\"a\": {\"op\": \"paint\", \"children\": [{\"shape\": \"sphere\"}]}"), "objects.a.op: ", "paint", "union, subtract or intersect"},
+        BadScene{with_object("\"a\": {\"op\": \"paint\", \"children\": [{\"shape\": \"sphere\"}]}"),
+                 "objects.a.op: ", "paint", "union, subtract or intersect"},
         BadScene{with_object("\"\": {\"shape\": \"sphere\"}", ""), "objects.", "empty name", "give it a name"},
-        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"roughness\": 1.5}}}", "materials.a.roughness: ", "1.5", "[0, 1]"},
-        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"opacity\": 0}}}", "materials.a.opacity: ", "0 is out of range", "(0, 1]"},
-        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"color\": [1, 1, 1]}}}", "materials.a.color: ", "unknown key", "base_color"},
-        BadScene{"{\"format\": 1, \"field\": {\"voxel_size\": 0}}", "field.voxel_size: ", "0 is out of range", "greater than 0"},
+        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"roughness\": 1.5}}}", "materials.a.roughness: ", "1.5",
+                 "[0, 1]"},
+        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"opacity\": 0}}}",
+                 "materials.a.opacity: ", "0 is out of range", "(0, 1]"},
+        BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"color\": [1, 1, 1]}}}",
+                 "materials.a.color: ", "unknown key", "base_color"},
+        BadScene{"{\"format\": 1, \"field\": {\"voxel_size\": 0}}", "field.voxel_size: ", "0 is out of range",
+                 "greater than 0"},
         BadScene{"{\"format\": 1, \"field\": {\"cells\": 63}}", "field.cells: ", "not a power of two", "use 32"},
-        BadScene{"{\"format\": 1, \"field\": {\"bounds\": {\"min\": [0, 0, 0], \"max\": [1, 0, 1]}}}", "field.bounds: ", "not below", "move them apart"},
-        BadScene{"{\"format\": 1, \"field\": {\"bounds\": {\"min\": [0, 0, 0]}}}", "field.bounds: ", "\"max\" is missing", "add it"},
-        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"sun\"}]}", "lights[0].type: ", "\"sun\"", "\"directional\""},
+        BadScene{"{\"format\": 1, \"field\": {\"bounds\": {\"min\": [0, 0, 0], \"max\": [1, 0, 1]}}}",
+                 "field.bounds: ", "not below", "move them apart"},
+        BadScene{"{\"format\": 1, \"field\": {\"bounds\": {\"min\": [0, 0, 0]}}}",
+                 "field.bounds: ", "\"max\" is missing", "add it"},
+        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"sun\"}]}", "lights[0].type: ", "\"sun\"",
+                 "\"directional\""},
         BadScene{"{\"format\": 1, \"lights\": [{}]}", "lights[0]: ", "\"type\" is missing", "add it"},
-        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"point\", \"direction\": [0, 1, 0]}]}", "lights[0].direction: ", "a point light has no such key", "remove it"},
-        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"spot\", \"inner_deg\": 40}]}", "lights[0]: ", "inner_deg 40 is above", "must not be"},
-        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"directional\", \"direction\": [0, 0, 0]}]}", "lights[0].direction: ", "length 0", "such as"},
-        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"target\": [3, 2, 4]}}}", "cameras.m: ", "same point", "move one"},
-        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"fov_y_deg\": 180}}}", "cameras.m.fov_y_deg: ", "180", "[1, 170]"},
-        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"tone_map\": \"acse\"}}}", "cameras.m.tone_map: ", "\"acse\"", "\"aces\""},
-        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\", \"edits\": [\"x\"]}]}", "bodies[0].edits[0]: ", "no edit \"x\"", "there are none"},
-        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\"}]}", "bodies[0]: ", "either \"edits\" or a \"mesh\"", "give it one"},
-        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\", \"mesh\": \"m\"}]}", "bodies[0].mesh: ", "no mesh", "there are none"},
-        BadScene{"{\"format\": 1, \"triggers\": [{\"id\": \"t\", \"object\": \"o\"}]}", "triggers[0].object: ", "no object", "there are none"},
-        BadScene{"{\"format\": 1, \"meshes\": [{\"id\": \"a\", \"file\": \"a.obj\"}, {\"id\": \"a\", \"file\": \"b.obj\"}]}", "meshes[1].id: ", "meshes[0] has this id", "choose another"},
-        BadScene{"{\"format\": 1, \"cloths\": [{\"id\": \"c\", \"pinned\": \"left\"}]}", "cloths[0].pinned: ", "\"left\"", "\"top\""},
+        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"point\", \"direction\": [0, 1, 0]}]}",
+                 "lights[0].direction: ", "a point light has no such key", "remove it"},
+        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"spot\", \"inner_deg\": 40}]}",
+                 "lights[0]: ", "inner_deg 40 is above", "must not be"},
+        BadScene{"{\"format\": 1, \"lights\": [{\"type\": \"directional\", \"direction\": [0, 0, 0]}]}",
+                 "lights[0].direction: ", "length 0", "such as"},
+        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"target\": [3, 2, 4]}}}", "cameras.m: ", "same point",
+                 "move one"},
+        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"fov_y_deg\": 180}}}", "cameras.m.fov_y_deg: ", "180",
+                 "[1, 170]"},
+        BadScene{"{\"format\": 1, \"cameras\": {\"m\": {\"tone_map\": \"acse\"}}}", "cameras.m.tone_map: ", "\"acse\"",
+                 "\"aces\""},
+        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\", \"edits\": [\"x\"]}]}",
+                 "bodies[0].edits[0]: ", "no edit \"x\"", "there are none"},
+        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\"}]}", "bodies[0]: ", "either \"edits\" or a \"mesh\"",
+                 "give it one"},
+        BadScene{"{\"format\": 1, \"bodies\": [{\"id\": \"b\", \"mesh\": \"m\"}]}", "bodies[0].mesh: ", "no mesh",
+                 "there are none"},
+        BadScene{"{\"format\": 1, \"triggers\": [{\"id\": \"t\", \"object\": \"o\"}]}",
+                 "triggers[0].object: ", "no object", "there are none"},
+        BadScene{
+            "{\"format\": 1, \"meshes\": [{\"id\": \"a\", \"file\": \"a.obj\"}, {\"id\": \"a\", \"file\": \"b.obj\"}]}",
+            "meshes[1].id: ", "meshes[0] has this id", "choose another"},
+        BadScene{"{\"format\": 1, \"cloths\": [{\"id\": \"c\", \"pinned\": \"left\"}]}",
+                 "cloths[0].pinned: ", "\"left\"", "\"top\""},
         BadScene{"{\"format\": 1, \"fluids\": [{\"id\": \"f\"}]}", "fluids[0]: ", "\"box\" is missing", "add it"},
         BadScene{"{\"format\": 1, \"wind\": [0, 0]}", "wind: ", "2 numbers", "must be 3"},
         BadScene{"{\"format\": 1, \"physics\": {\"step\": 0}}", "physics.step: ", "0 is out of range", "(0, 1]"}));
 
 TEST(SceneFile, PlacesCountLinesAndCharacters) {
-    EXPECT_THAT(fault_of("{\n  \"format\": 1,\n  \"edits\": [\n    { \"shape\": \"sphere\", \"radius\": -1 }\n  ]\n}"), StartsWith("s.json:4:36: edits[0].radius: "));
+    EXPECT_THAT(fault_of("{\n  \"format\": 1,\n  \"edits\": [\n    { \"shape\": \"sphere\", \"radius\": -1 }\n  ]\n}"),
+                StartsWith("s.json:4:36: edits[0].radius: "));
 }
 
 TEST(SceneFile, ReadsEveryPartOfAnEdit) {
-    auto s = read_scene(scene_with("{\"id\": \"e\", \"shape\": \"torus\", \"major_radius\": 2, \"op\": \"subtract\", \"blend_radius\": 0.25,"
-                                   "\"material_blend_radius\": 0.5, \"position\": [1, 2, 3], \"rotation\": [0, 0, 0.6, 0.8], \"scale\": 2,"
-                                   "\"domain\": [{\"warp\": \"mirror\", \"axis\": \"z\"}, {\"warp\": \"twist\", \"rate\": 1.5}], \"material\": \"glass\","
-                                   "\"dynamic\": true, \"hidden\": true, \"group\": \"g\"}",
-                                   kMaterials),
-                        "s.json");
+    auto s = read_scene(
+        scene_with(
+            "{\"id\": \"e\", \"shape\": \"torus\", \"major_radius\": 2, \"op\": \"subtract\", \"blend_radius\": 0.25,"
+            "\"material_blend_radius\": 0.5, \"position\": [1, 2, 3], \"rotation\": [0, 0, 0.6, 0.8], \"scale\": 2,"
+            "\"domain\": [{\"warp\": \"mirror\", \"axis\": \"z\"}, {\"warp\": \"twist\", \"rate\": 1.5}], "
+            "\"material\": \"glass\","
+            "\"dynamic\": true, \"hidden\": true, \"group\": \"g\"}",
+            kMaterials),
+        "s.json");
     ASSERT_TRUE(s) << s.error().message;
     const Edit& e = s->edits[0];
     EXPECT_EQ(e.name, "e");
@@ -160,16 +220,19 @@ TEST(SceneFile, RotationsNearUnitLengthAreNormalised) {
 }
 
 TEST(SceneFile, EditsWithoutIdsGetFreeOnes) {
-    auto s = read_scene(scene_with("{\"shape\": \"sphere\"}, {\"id\": \"sphere-1\", \"shape\": \"box\"}, {\"shape\": \"box\"}"), "s.json");
+    auto s = read_scene(
+        scene_with("{\"shape\": \"sphere\"}, {\"id\": \"sphere-1\", \"shape\": \"box\"}, {\"shape\": \"box\"}"),
+        "s.json");
     ASSERT_TRUE(s);
     EXPECT_EQ(s->edits[0].name, "sphere-1-2");
     EXPECT_EQ(s->edits[2].name, "box-3");
 }
 
 TEST(SceneFile, TreesKeepTheirOrder) {
-    auto s = read_scene(with_object("\"a\": {\"op\": \"subtract\", \"blend_radius\": 0.1, \"children\": ["
-                                    "{\"children\": [{\"shape\": \"box\"}, {\"shape\": \"torus\"}]}, {\"shape\": \"sphere\"}]}"),
-                        "s.json");
+    auto s = read_scene(
+        with_object("\"a\": {\"op\": \"subtract\", \"blend_radius\": 0.1, \"children\": ["
+                    "{\"children\": [{\"shape\": \"box\"}, {\"shape\": \"torus\"}]}, {\"shape\": \"sphere\"}]}"),
+        "s.json");
     ASSERT_TRUE(s) << s.error().message;
     const auto& nodes = s->objects[0].nodes;
     ASSERT_EQ(nodes.size(), 5u);
@@ -192,7 +255,8 @@ TEST(SceneFile, DeepTreesAndLongChainsOfReferencesNeedNoStack) {
     EXPECT_NEAR(deep->distance({2, 0, 0}), 1.5f, 1e-5f);
 
     std::string chain = "\"o0\": {\"shape\": \"sphere\"}";
-    for (int i = 1; i < kDeep; ++i) chain += ", \"o" + std::to_string(i) + "\": {\"object\": \"o" + std::to_string(i - 1) + "\"}";
+    for (int i = 1; i < kDeep; ++i)
+        chain += ", \"o" + std::to_string(i) + "\": {\"object\": \"o" + std::to_string(i - 1) + "\"}";
     auto linked = World::parse(with_object(chain, "o" + std::to_string(kDeep - 1)), "s.json");
     ASSERT_TRUE(linked) << linked.error().message.substr(0, 300);
     EXPECT_NEAR(linked->distance({2, 0, 0}), 1.5f, 1e-5f);
@@ -212,11 +276,13 @@ TEST(SceneFile, DoublingObjectsAreRefusedNotExpanded) {
 }
 
 TEST(SceneFile, SectionsOfLaterVersionsAreReadAndTold) {
-    const std::string text = scene_with("{\"id\": \"rock\", \"shape\": \"sphere\"}",
-                                        "\"meshes\": [{\"id\": \"m\", \"file\": \"m.glb\", \"outline\": {\"color\": [1, 0, 0], \"width_px\": 2}}],"
-                                        "\"bodies\": [{\"id\": \"b\", \"edits\": [\"rock\"]}, {\"id\": \"c\", \"mesh\": \"m\", \"collision\": \"convex\"}],"
-                                        "\"cloths\": [{\"id\": \"f\", \"pinned\": [[0, 0], [3, 0]], \"size\": 2}], \"fluids\": [], \"wind\": [1, 0, 0],"
-                                        "\"environment\": {\"file\": \"sky.exr\"}");
+    const std::string text = scene_with(
+        "{\"id\": \"rock\", \"shape\": \"sphere\"}",
+        "\"meshes\": [{\"id\": \"m\", \"file\": \"m.glb\", \"outline\": {\"color\": [1, 0, 0], \"width_px\": 2}}],"
+        "\"bodies\": [{\"id\": \"b\", \"edits\": [\"rock\"]}, {\"id\": \"c\", \"mesh\": \"m\", \"collision\": "
+        "\"convex\"}],"
+        "\"cloths\": [{\"id\": \"f\", \"pinned\": [[0, 0], [3, 0]], \"size\": 2}], \"fluids\": [], \"wind\": [1, 0, 0],"
+        "\"environment\": {\"file\": \"sky.exr\"}");
     auto s = read_scene(text, "s.json");
     ASSERT_TRUE(s) << s.error().message;
     EXPECT_THAT(s->undrawn, testing::UnorderedElementsAre("environment.file", "meshes", "bodies", "cloths"));
@@ -235,9 +301,11 @@ TEST(SceneFile, TheExampleOfTheFormatReads) {
 TEST(SceneFile, EveryKeyOfTheTablesIsInTheDocumentation) {
     std::ifstream in(std::string(KILN_SOURCE_DIR) + "/docs/scene-format.md");
     const std::string page((std::istreambuf_iterator<char>(in)), {});
-    for (const Table* table : {&kSceneTable, &kFieldTable, &kMaterialTable, &kLightTable, &kEnvironmentTable, &kCameraTable, &kEditTable, &kNodeTable,
-                               &kOutlineTable, &kMeshTable, &kPhysicsTable, &kBodyTable, &kTriggerTable, &kClothTable, &kFluidTable})
-        for (const KeyRow& row : table->rows) EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`")) << table->name;
+    for (const Table* table : {&kSceneTable, &kFieldTable, &kMaterialTable, &kLightTable, &kEnvironmentTable,
+                               &kCameraTable, &kEditTable, &kNodeTable, &kOutlineTable, &kMeshTable, &kPhysicsTable,
+                               &kBodyTable, &kTriggerTable, &kClothTable, &kFluidTable})
+        for (const KeyRow& row : table->rows)
+            EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`")) << table->name;
     for (const auto rows : {sdf::shape_rows(), sdf::warp_rows()})
         for (const sdf::KindRow& row : rows) {
             EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`"));

@@ -28,20 +28,25 @@ TEST(SceneWriter, SavingTwiceGivesTheSameBytes) {
 }
 
 TEST(SceneWriter, KeepsKeyOrderDefaultsAndForms) {
-    const std::string text = "{\n"
-                             "  \"edits\": [{ \"op\": \"union\", \"scale\": 2, \"shape\": \"sphere\", \"id\": \"a\", \"radius\": 0.1, \"blend_radius\": 0 }],\n"
-                             "  \"cameras\": { \"b\": { \"position\": [1, 2, 3] }, \"a\": { \"fov_y_deg\": 30 } },\n"
-                             "  \"format\": 1,\n"
-                             "  \"wind\": [1, 0, 0.1],\n"
-                             "  \"materials\": { \"z\": { \"metallic\": 0 }, \"y\": {} },\n"
-                             "  \"lights\": [{ \"intensity\": 20, \"type\": \"point\" }],\n"
-                             "  \"bodies\": [{ \"id\": \"rock\", \"edits\": [\"a\"], \"density\": 2000 }]\n"
-                             "}\n";
+    const std::string text =
+        "{\n"
+        "  \"edits\": [{ \"op\": \"union\", \"scale\": 2, \"shape\": \"sphere\", \"id\": \"a\", \"radius\": 0.1, "
+        "\"blend_radius\": 0 }],\n"
+        "  \"cameras\": { \"b\": { \"position\": [1, 2, 3] }, \"a\": { \"fov_y_deg\": 30 } },\n"
+        "  \"format\": 1,\n"
+        "  \"wind\": [1, 0, 0.1],\n"
+        "  \"materials\": { \"z\": { \"metallic\": 0 }, \"y\": {} },\n"
+        "  \"lights\": [{ \"intensity\": 20, \"type\": \"point\" }],\n"
+        "  \"bodies\": [{ \"id\": \"rock\", \"edits\": [\"a\"], \"density\": 2000 }]\n"
+        "}\n";
     EXPECT_EQ(saved(text), text);
 }
 
 TEST(SceneWriter, ChangesAreWrittenInPlace) {
-    auto world = World::parse(scene_with("{\"material\": \"m\", \"radius\": 1, \"shape\": \"sphere\", \"id\": \"a\"}, {\"shape\": \"box\", \"id\": \"b\"}", "\"materials\": {\"m\": {}}"), "s.json");
+    auto world = World::parse(scene_with("{\"material\": \"m\", \"radius\": 1, \"shape\": \"sphere\", \"id\": \"a\"}, "
+                                         "{\"shape\": \"box\", \"id\": \"b\"}",
+                                         "\"materials\": {\"m\": {}}"),
+                              "s.json");
     ASSERT_TRUE(world);
     const EditId a = *world->find_edit("a");
     Edit edit = *world->find(a);
@@ -49,10 +54,14 @@ TEST(SceneWriter, ChangesAreWrittenInPlace) {
     edit.node.shape = Torus{.major_radius = 2, .minor_radius = 0.5f};
     ASSERT_TRUE(world->change(a, edit));
     ASSERT_TRUE(world->remove(*world->find_edit("b")));
-    ASSERT_TRUE(world->add({.name = "c", .node = {.shape = Sphere{.radius = 3}}}));
+    Edit c;
+    c.name = "c";
+    c.node.shape = Sphere{.radius = 3};
+    ASSERT_TRUE(world->add(c));
     world->cameras.emplace_back("near", Camera{.fov_y_deg = 20});
     const std::string out = world->to_json();
-    EXPECT_THAT(out, HasSubstr("{ \"material\": \"m\", \"shape\": \"torus\", \"id\": \"a\", \"major_radius\": 2, \"minor_radius\": 0.5, \"op\": \"subtract\" }"));
+    EXPECT_THAT(out, HasSubstr("{ \"material\": \"m\", \"shape\": \"torus\", \"id\": \"a\", \"major_radius\": 2, "
+                               "\"minor_radius\": 0.5, \"op\": \"subtract\" }"));
     EXPECT_THAT(out, testing::Not(HasSubstr("\"b\"")));
     EXPECT_THAT(out, HasSubstr("{ \"id\": \"c\", \"shape\": \"sphere\", \"radius\": 3 }"));
     EXPECT_THAT(out, HasSubstr("\"near\": { \"fov_y_deg\": 20 }"));
@@ -62,13 +71,22 @@ TEST(SceneWriter, ChangesAreWrittenInPlace) {
 TEST(SceneWriter, WorldsMadeByCodeSaveAndLoad) {
     World world;
     const MaterialId clay = world.add_material("clay", {.base_color = {0.7f, 0.3f, 0.2f}});
-    Object washer{.name = "washer", .nodes = {}};
-    washer.nodes.push_back({.kind = Node::Kind::Fold, .op = Op::Subtract, .children = {1, 2}});
-    washer.nodes.push_back({.shape = Cylinder{.half_height = 0.1f, .radius = 0.4f}});
-    washer.nodes.push_back({.shape = Cylinder{.half_height = 0.2f, .radius = 0.2f}, .domain = {Mirror{.axis = 1}}});
+    Object washer;
+    washer.name = "washer";
+    washer.nodes.resize(3);
+    washer.nodes[0].kind = Node::Kind::Fold;
+    washer.nodes[0].op = Op::Subtract;
+    washer.nodes[0].children = {1, 2};
+    washer.nodes[1].shape = Cylinder{.half_height = 0.1f, .radius = 0.4f};
+    washer.nodes[2].shape = Cylinder{.half_height = 0.2f, .radius = 0.2f};
+    washer.nodes[2].domain.push_back(Mirror{.axis = 1});
     const auto object = world.add_object(washer);
     ASSERT_TRUE(object) << object.error().message;
-    ASSERT_TRUE(world.add({.node = {.kind = Node::Kind::Object, .object = *object, .material = clay}}));
+    Edit placed;
+    placed.node.kind = Node::Kind::Object;
+    placed.node.object = *object;
+    placed.node.material = clay;
+    ASSERT_TRUE(world.add(placed));
     world.field_settings.voxel_size = 0.01f;
     world.field_settings.bounds = Box3{{-1, -1, -1}, {1, 1, 1}};
     world.lights.push_back({.kind = Light::Kind::Spot, .direction = {0, -1, 0}, .position = {0, 3, 0}});
@@ -78,7 +96,8 @@ TEST(SceneWriter, WorldsMadeByCodeSaveAndLoad) {
     ASSERT_TRUE(again) << again.error().message << "\n" << text;
     EXPECT_EQ(again->to_json(), text);
     EXPECT_EQ(again->field_settings.bounds, world.field_settings.bounds);
-    for (const vec3 p : {vec3{0, 0, 0}, vec3{0.3f, 0, 0}, vec3{1, 1, 1}}) EXPECT_EQ(again->distance(p), world.distance(p));
+    for (const vec3 p : {vec3{0, 0, 0}, vec3{0.3f, 0, 0}, vec3{1, 1, 1}})
+        EXPECT_EQ(again->distance(p), world.distance(p));
 }
 
 RC_GTEST_PROP(SceneWriter, AnyEditReadsBackAsItself, (uint32_t seed)) {

@@ -77,7 +77,8 @@ private:
 
 TEST(Schema, AcceptsTheBundledScenes) {
     const Checker checker(schema_json());
-    for (const BundledScene& scene : bundled_files()) EXPECT_TRUE(checker.accepts(std::string(scene.json))) << scene.name;
+    for (const BundledScene& scene : bundled_files())
+        EXPECT_TRUE(checker.accepts(std::string(scene.json))) << scene.name;
 }
 
 // Where a schema can tell, reader and schema are of one mind.
@@ -111,7 +112,8 @@ TEST(Schema, AgreesWithTheReader) {
         EXPECT_EQ(checker.accepts(text), good) << edit;
         EXPECT_EQ(fault_of(text).empty(), good) << edit << fault_of(text);
     }
-    for (const char* node : {"{\"shape\": \"box\", \"op\": \"union\"}", "{\"children\": []}", "{\"op\": \"paint\", \"children\": [{\"shape\": \"box\"}]}"}) {
+    for (const char* node : {"{\"shape\": \"box\", \"op\": \"union\"}", "{\"children\": []}",
+                             "{\"op\": \"paint\", \"children\": [{\"shape\": \"box\"}]}"}) {
         const std::string text = "{\"format\": 1, \"objects\": {\"o\": " + std::string(node) + "}}";
         EXPECT_FALSE(checker.accepts(text)) << node;
         EXPECT_NE(fault_of(text), "") << node;

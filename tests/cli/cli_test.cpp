@@ -1,0 +1,301 @@
+// SPDX-License-Identifier: MIT
+// The command line from outside: exit codes, where things are said, and that nothing is left behind.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+struct Outcome {
+    int code = -1;
+    std::string out, err;
+};
+
+std::string read(const fs::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    std::stringstream s;
+    s << in.rdbuf();
+    return s.str();
+}
+
+// Every test works in a folder of its own.
+class Cli : public testing::Test {
+protected:
+    void SetUp() override {
+        std::string name = (fs::temp_directory_path() / "kiln-cli-XXXXXX").string();
+        ASSERT_NE(::mkdtemp(name.data()), nullptr);
+        folder_ = name;
+    }
+    void TearDown() override { fs::remove_all(folder_); }
+
+    /// Runs `kiln WORDS` by the shell, in the test's folder. `before`: shell words in front.
+    Outcome run(const std::string& words, const std::string& before = "") {
+        const std::string command =
+            "cd '" + folder_.string() + "' && " + before + " '" KILN_PROGRAM "' " + words + " >.out 2>.err";
+        const int status = std::system(command.c_str());
+        Outcome o{WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), read(folder_ / ".out"),
+                  read(folder_ / ".err")};
+        fs::remove(folder_ / ".out");
+        fs::remove(folder_ / ".err");
+        return o;
+    }
+    void write(const std::string& name, const std::string& text) {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    std::vector<std::string> files() const {
+        std::vector<std::string> out;
+        for (const auto& entry : fs::directory_iterator(folder_)) out.push_back(entry.path().filename());
+        std::sort(out.begin(), out.end());
+        return out;
+    }
+
+    fs::path folder_;
+};
+
+void expect_one_line(const Outcome& o, const std::string& what) {
+    EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << what << ": " << o.err;
+}
+
+constexpr const char* kNoVulkan = "VK_ICD_FILENAMES=/nonexistent VK_DRIVER_FILES=/nonexistent";
+constexpr const char* kBall = "{\"format\": 1, \"edits\": [{\"id\": \"ball\", \"shape\": \"sphere\", \"radius\": 1}]}";
+
+TEST_F(Cli, WrongUsageIsTwo) {
+    const std::pair<const char*, const char*> cases[] = {
+        {"rendr x -o a.png", "did you mean `kiln render`?"},
+        {"frobnicate", "`kiln --help` lists them"},
+        {"simulate x", "comes with a later version"},
+        {"render", "required"},
+        {"render potter", "--output"},
+        {"render potter -o a.jpg", "end the name in .png or .exr"},
+        {"render potter -o -", "name a file"},
+        {"render potter -o a.png --size 0x10", "WIDTHxHEIGHT"},
+        {"render potter -o a.png --size big", "WIDTHxHEIGHT"},
+        {"render potter -o a.png --size 99999x1", "WIDTHxHEIGHT"},
+        {"render potter -o a.png --view nomal", "did you mean normal?"},
+        {"render potter -o a.png --unpruned", "--analytic"},
+        {"render potter -o a.png --frobnicate", "--help"},
+        {"render potter -o a.png --camera maim --size 8x8", "did you mean \"main\"?"},
+        {"demo potte", "did you mean potter?"},
+        {"query potter", "--points"},
+        {"query potter --points - --nearest", "later version"},
+    };
+    for (const auto& [words, says] : cases) {
+        const Outcome o = run(words);
+        EXPECT_EQ(o.code, 2) << words << o.err;
+        EXPECT_THAT(o.err, HasSubstr(says)) << words;
+        EXPECT_EQ(o.out, "") << words;
+        expect_one_line(o, words);
+        EXPECT_THAT(files(), testing::IsEmpty()) << words;
+    }
+    EXPECT_EQ(run("").code, 2);
+}
+
+TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
+    for (const char* verb : {"", "demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare"}) {
+        const Outcome o = run(std::string(verb) + " --help");
+        EXPECT_EQ(o.code, 0) << verb;
+        EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;
+        EXPECT_LE(std::count(o.out.begin(), o.out.end(), '\n'), 40) << o.out;
+        EXPECT_EQ(o.err, "");
+    }
+    EXPECT_THAT(run("--version").out, StartsWith("kiln "));
+}
+
+TEST_F(Cli, BadInputIsThreeWithPlaceAndMend) {
+    fs::create_directory(folder_ / "folder");
+    const std::pair<const char*, const char*> scenes[] = {
+        {"", "bad.kiln.json:1:1: "},
+        {"{\"format\": 1,}", "bad.kiln.json:1:13: "},
+        {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": NaN}]}", "finite"},
+        {"{\"format\": 1, \"edits\": [{\"shape\": \"spher\"}]}", "did you mean \"sphere\"?"},
+        {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": 0}]}",
+         "bad.kiln.json:1:54: edits[0].radius: "},
+        {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": 1e30}]}", "at most"},
+        {"{\"format\": 1, \"objects\": {\"a\": {\"object\": \"a\"}}, \"edits\": [{\"object\": \"a\"}]}",
+         "contains itself"},
+        {"{\"format\": 1, \"edits\": [{\"shape\": \"heightfield\", \"file\": \"none.png\"}]}", "none.png"},
+        {"\x89PNG\r\n\x1a\n", "bad.kiln.json:1:1: "},
+    };
+    for (const auto& [text, says] : scenes) {
+        write("bad.kiln.json", text);
+        for (const std::string words : {"validate bad.kiln.json", "inspect bad.kiln.json",
+                                        "render bad.kiln.json -o a.png", "query bad.kiln.json --points /dev/null"}) {
+            const Outcome o = run(words);
+            EXPECT_EQ(o.code, 3) << words << text << o.err;
+            EXPECT_THAT(o.err, StartsWith("bad.kiln.json:1:")) << words;
+            EXPECT_THAT(o.err, HasSubstr(says)) << words;
+            expect_one_line(o, words);
+            EXPECT_EQ(o.out, "");
+            EXPECT_THAT(files(), testing::ElementsAre("bad.kiln.json", "folder"));
+        }
+    }
+    for (const char* words : {"validate none.kiln.json", "validate folder", "validate potte",
+                              "query potter --points none.csv", "compare a.png b.png"}) {
+        const Outcome o = run(words);
+        EXPECT_EQ(o.code, 3) << words << o.err;
+        expect_one_line(o, words);
+    }
+    write("bad.kiln.json", "{\"format\": 3}");
+    EXPECT_THAT(run("validate bad.kiln.json --json").out, HasSubstr("\"valid\": false"));
+}
+
+TEST_F(Cli, UnwritableOutputIsOneAndMakesNoFolder) {
+    write("ball.kiln.json", kBall);
+    fs::create_directory(folder_ / "taken.png");
+    for (const std::string out : {"none/a.png", "ball.kiln.json/a.png", "taken.png"}) {
+        const Outcome o = run("render ball.kiln.json --size 8x8 -o " + out);
+        EXPECT_EQ(o.code, 1) << out << o.err;
+        EXPECT_THAT(o.err, HasSubstr(out));
+        expect_one_line(o, out);
+    }
+    EXPECT_THAT(files(), testing::ElementsAre("ball.kiln.json", "taken.png"));
+    EXPECT_EQ(run("schema", "").code, 0);
+    const std::string full = "cd '" + folder_.string() + "' && '" KILN_PROGRAM "' schema >/dev/full 2>.err";
+    EXPECT_EQ(WEXITSTATUS(std::system(full.c_str())), 1);
+}
+
+TEST_F(Cli, WithoutVulkanQueriesWorkAndRenderIsFour) {
+    write("ball.kiln.json", kBall);
+    const Outcome render = run("render ball.kiln.json -o a.png", kNoVulkan);
+    EXPECT_EQ(render.code, 4) << render.err;
+    EXPECT_THAT(render.err, HasSubstr("kiln doctor"));
+    expect_one_line(render, "render");
+    EXPECT_THAT(files(), testing::ElementsAre("ball.kiln.json"));
+    EXPECT_EQ(run("validate ball.kiln.json", kNoVulkan).code, 0);
+    EXPECT_EQ(run("schema", kNoVulkan).code, 0);
+    EXPECT_THAT(run("inspect ball.kiln.json --json", kNoVulkan).out, HasSubstr("\"edits\": 1"));
+    EXPECT_THAT(run("query ball.kiln.json --points -", std::string("echo 0,2,0 | ") + kNoVulkan).out,
+                HasSubstr("0,2,0,1,0,1,0,"));
+    const Outcome doctor = run("doctor --json", kNoVulkan);
+    EXPECT_EQ(doctor.code, 0);
+    EXPECT_THAT(doctor.out, HasSubstr("\"devices\": []"));
+    EXPECT_THAT(doctor.out, HasSubstr("mesa-vulkan-drivers"));
+    EXPECT_THAT(doctor.out, HasSubstr("\"physics\": [], \"default_physics\": null"));
+}
+
+TEST_F(Cli, QueryAnswersInOrder) {
+    write("two.kiln.json",
+          "{\"format\": 1, \"materials\": {\"a,b\": {}}, \"edits\": [{\"id\": \"ball\", \"shape\": \"sphere\", "
+          "\"radius\": 1, \"material\": \"a,b\"},"
+          "{\"id\": \"floor\", \"shape\": \"plane\", \"position\": [0, -3, 0]}]}");
+    write("p.csv", "x,y,z\r\n0, 3 ,0\r\n\r\n+2,0,0\n0,-4,1e-3\n");
+    const Outcome o = run("query two.kiln.json --points p.csv");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.out,
+              "x,y,z,distance,nx,ny,nz,material\n0,3,0,2,0,1,0,\"a,b\"\n+2,0,0,1,1,0,0,\"a,b\"\n0,-4,1e-3,-1,0,1,0,\n");
+    write("r.csv", "0,5,0,0,-2,0\n5,0,0,0,1,0\n");
+    const Outcome rays = run("query two.kiln.json --rays --points r.csv");
+    EXPECT_THAT(rays.out, StartsWith("hit,t,x,y,z,nx,ny,nz,edit\n1,4,0,1,0,0,1,0,ball\n0,,,,,,,,\n")) << rays.err;
+
+    const std::pair<const char*, const char*> bad[] = {
+        {"1,2\n", "bad.csv:1: "},        {"x,y,z\n1,2,3\n1,2,q\n", "bad.csv:3: "},
+        {"1,2,3,4\n", "bad.csv:1: "},    {"1,nan,3\n", "bad.csv:1: "},
+        {"nan,1,3\n", "bad.csv:1: "},    {"1,2,1e60\n", "bad.csv:1: "},
+        {"1,2,3\n1,,3\n", "bad.csv:2: "}};
+    for (const auto& [text, place] : bad) {
+        write("bad.csv", text);
+        const Outcome b = run("query two.kiln.json --points bad.csv");
+        EXPECT_EQ(b.code, 3) << text;
+        EXPECT_THAT(b.err, StartsWith(place)) << text;
+        expect_one_line(b, text);
+    }
+    write("bad.csv", "0,0,0,0,0,0\n");
+    EXPECT_EQ(run("query two.kiln.json --rays --points bad.csv").code, 3);
+}
+
+TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
+    write("ball.kiln.json", kBall);
+    std::string points;
+    for (int i = 0; i < 50; ++i) points += "0.001," + std::to_string(0.98 + 0.001 * i) + ",0.002\n";
+    write("p.csv", points);
+    std::istringstream exact(run("query ball.kiln.json --points p.csv").out),
+        bricks(run("query ball.kiln.json --field --points p.csv").out);
+    std::string a, b;
+    int rows = 0;
+    while (std::getline(exact, a) && std::getline(bricks, b)) {
+        if (a[0] == 'x') continue;
+        const auto distance = [](std::string row) {
+            for (int i = 0; i < 3; ++i) row.erase(0, row.find(',') + 1);
+            return std::stof(row);
+        };
+        EXPECT_NEAR(distance(a), distance(b), 1e-4f) << a;
+        ++rows;
+    }
+    EXPECT_EQ(rows, 50);
+}
+
+TEST_F(Cli, DemoListsScenes) {
+    const Outcome o = run("demo --list");
+    EXPECT_EQ(o.code, 0);
+    for (const char* name : {"orbit", "potter", "quarry"}) EXPECT_THAT(o.out, HasSubstr(name));
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 3);
+}
+
+TEST_F(Cli, ReferenceNeedsNoDevice) {
+    write("ball.kiln.json", kBall);
+    const Outcome o = run("render ball.kiln.json -o a.png --size 16x12 --reference 2 --json", kNoVulkan);
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(o.out, HasSubstr("\"size\": [16, 12]"));
+    EXPECT_THAT(files(), testing::ElementsAre("a.png", "ball.kiln.json"));
+    EXPECT_THAT(run("compare a.png a.png --json").out, HasSubstr("\"equal\": true"));
+}
+
+TEST_F(Cli, InterruptedIs130AndLeavesNothing) {
+    write("ball.kiln.json", kBall);
+    // Long enough to be interrupted: a path-traced picture.
+    const std::string command = "cd '" + folder_.string() +
+                                "' && timeout --preserve-status -s INT 1 '" KILN_PROGRAM
+                                "' render ball.kiln.json -o a.png --size 4096x4096 --reference 4096 >/dev/null 2>&1";
+    EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 130);
+    EXPECT_THAT(files(), testing::ElementsAre("ball.kiln.json"));
+}
+
+// On a device (the CPU renderer of the gate).
+class CliGpu : public Cli {
+protected:
+    void SetUp() override {
+        Cli::SetUp();
+        if (run("doctor --json").out.find("\"usable\": true") == std::string::npos) {
+            if (std::getenv("REQUIRE_VULKAN")) FAIL() << "no usable device";
+            GTEST_SKIP() << "no usable device";
+        }
+    }
+};
+
+TEST_F(CliGpu, RenderWritesThePictureAndItsCost) {
+    write("ball.kiln.json", kBall);
+    const Outcome o = run("render ball.kiln.json -o a.png --size 64x48 --json");
+    ASSERT_EQ(o.code, 0) << o.err;
+    for (const char* key : {"\"device\": ", "\"size\": [64, 48]", "\"edits\": 1",
+                            "\"bricks\": ", "\"frame_ms\": ", "\"passes\": {", "\"evaluations\": "})
+        EXPECT_THAT(o.out, HasSubstr(key));
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 1);
+    EXPECT_THAT(o.err, testing::Not(HasSubstr("\r"))) << "progress is for terminals";
+    EXPECT_EQ(read(folder_ / "a.png").substr(1, 3), "PNG");
+    EXPECT_THAT(files(), testing::ElementsAre("a.png", "ball.kiln.json"));
+    const Outcome depth = run("render ball.kiln.json -o a.exr --size 64x48 --view depth");
+    EXPECT_EQ(depth.code, 0) << depth.err;
+    EXPECT_EQ(run("render ball.kiln.json -o b.png --size 64x48 --device nosuchdevice").code, 4);
+    EXPECT_FALSE(fs::exists(folder_ / "b.png"));
+}
+
+TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
+    write("later.kiln.json",
+          "{\"format\": 1, \"meshes\": [{\"id\": \"m\", \"file\": \"m.glb\"}], \"edits\": [{\"shape\": \"sphere\"}]}");
+    const Outcome o = run("render later.kiln.json -o a.png --size 16x16");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(o.err, HasSubstr("does not draw: meshes"));
+}
+
+}  // namespace

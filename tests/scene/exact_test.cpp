@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: MIT
+// Exact queries against the judge, which prunes nothing.
+#include "scene/exact.h"
+
+#include "scene/bundled.h"
+#include "sdf/judge.h"
+
+#include "scene_text.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+namespace kiln::scene {
+namespace {
+
+struct Compiled {
+    SceneData data;
+    sdf::Source source;
+    sdf::Program program;
+};
+
+Compiled compiled(const std::string& text) {
+    Compiled c{*read_scene(text, "s.json"), {}, {}};
+    c.source = {c.data.edits, c.data.objects, {}};
+    c.program = *sdf::compile(c.source);
+    return c;
+}
+
+TEST(Exact, PrunedAnswersAreTheFullListsOnTheBundledScenes) {
+    for (const BundledScene& scene : bundled_files()) {
+        const Compiled c = compiled(std::string(scene.json));
+        const sdf::Judge judge = *sdf::Judge::create(c.source);
+        const ExactField exact(c.program);
+        std::mt19937 random(3);
+        const Box3 box = c.program.bounds.inflated(0.1f);
+        for (int i = 0; i < 150; ++i) {
+            std::uniform_real_distribution<float> x(box.min.x, box.max.x), y(box.min.y, box.max.y),
+                z(box.min.z, box.max.z);
+            const vec3 p{x(random), y(random), z(random)};
+            const double truth = judge.distance({double(p.x), double(p.y), double(p.z)});
+            const double size = double(length(box.max - box.min));
+            EXPECT_NEAR(double(exact.sample(p).distance), truth, 2e-6 * size)
+                << scene.name << " " << p.x << " " << p.y << " " << p.z;
+        }
+    }
+}
+
+TEST(Exact, RaysEndOnTheSurfaceAndPassNothing) {
+    const Compiled c = compiled(scene_with(
+        "{\"shape\": \"plane\"}, {\"shape\": \"sphere\", \"radius\": 0.5, \"position\": [0, 0.5, 0], \"blend_radius\": "
+        "0.3},"
+        "{\"shape\": \"box\", \"op\": \"subtract\", \"half_extents\": [0.2, 0.2, 2], \"position\": [0, 0.6, 0]}"));
+    const sdf::Judge judge = *sdf::Judge::create(c.source);
+    const ExactField exact(c.program);
+    std::mt19937 random(5);
+    std::normal_distribution<float> gauss;
+    int hits = 0;
+    for (int i = 0; i < 300; ++i) {
+        // Origins near the middle as well: a ray's first pruned ball must be made, not assumed.
+        const vec3 o{gauss(random), 0.2f + std::abs(gauss(random)), gauss(random)},
+            d = normalize(vec3{gauss(random), gauss(random), gauss(random)});
+        const RayHit hit = exact.cast({.origin = o, .direction = d, .t_max = 50});
+        const auto at = [&](double t) {
+            return judge.distance(
+                {double(o.x) + t * double(d.x), double(o.y) + t * double(d.y), double(o.z) + t * double(d.z)});
+        };
+        const double end = hit.hit ? double(hit.t) : 50.0;
+        if (hit.hit) {
+            ++hits;
+            EXPECT_LE(at(end), 1e-5);
+        }
+        for (int k = 1; k < 200; ++k) {
+            if (at(0) > 0)
+                EXPECT_GT(at(end * k / 200), -1e-6)
+                    << "ray " << i << " passed a surface at " << end * k / 200 << " of " << end;
+        }
+    }
+    EXPECT_GT(hits, 100);
+}
+
+TEST(Exact, ShadowRayFromTheTableIsFree) {
+    // Was blocked: an empty pruned tape reads as solid.
+    const Compiled c = compiled(
+        scene_with("{\"shape\": \"plane\"}, {\"shape\": \"sphere\", \"radius\": 0.1, \"position\": [0, 0.1, 0]}"));
+    EXPECT_FALSE(ExactField(c.program).cast({.origin = {0.5f, 0.01f, 0.2f}, .direction = {0, 1, 0}}).hit);
+}
+
+TEST(Exact, TheHitNamesTheEditWithTheLargestShareTiesToTheLater) {
+    const Compiled c =
+        compiled(scene_with("{\"shape\": \"box\"}, {\"shape\": \"box\"}, {\"shape\": \"sphere\", \"radius\": 0.2, "
+                            "\"op\": \"subtract\", \"position\": [0, 0.5, 0]}"));
+    const ExactField exact(c.program);
+    EXPECT_EQ(exact.cast({.origin = {0.4f, 2, 0}, .direction = {0, -1, 0}}).edit.index, 1u);
+    EXPECT_EQ(exact.cast({.origin = {0, 2, 0}, .direction = {0, -1, 0}}).edit.index, 2u);
+}
+
+TEST(Exact, EditsBeyondSixtyFiveThousandAreNamed) {
+    std::string edits;
+    for (int i = 0; i < 70000; ++i)
+        edits += (i ? "," : "") + std::string("{\"shape\": \"sphere\", \"radius\": 0.4, \"position\": [") +
+                 std::to_string(i % 300) + ", 0, " + std::to_string(i / 300) + "]}";
+    const Compiled c = compiled(scene_with(edits));
+    const int last = 69999;
+    const RayHit hit =
+        ExactField(c.program).cast({.origin = {float(last % 300), 2, float(last / 300)}, .direction = {0, -1, 0}});
+    ASSERT_TRUE(hit.hit);
+    EXPECT_EQ(hit.edit.index, uint32_t(last));
+}
+
+TEST(Exact, EmptySpaceIsInfinitelyFar) {
+    const Compiled c = compiled(scene_with(""));
+    const ExactField exact(c.program);
+    EXPECT_TRUE(std::isinf(exact.distance({0, 0, 0})));
+    EXPECT_TRUE(std::isinf(exact.sample({1, 2, 3}).distance));
+    EXPECT_FALSE(exact.cast({}).hit);
+}
+
+}  // namespace
+}  // namespace kiln::scene

@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: MIT
+#include "scene/world_impl.h"
+
+#include "image/png_file.h"
+#include "scene_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+
+namespace kiln {
+namespace {
+
+using scene::scene_with;
+
+Edit ball(float radius, vec3 at = {}) {
+    Edit e;
+    e.node.shape = Sphere{.radius = radius};
+    e.node.transform.position = at;
+    return e;
+}
+
+TEST(World, EmptyWorldAnswers) {
+    const World world;
+    EXPECT_TRUE(std::isinf(world.distance({0, 0, 0})));
+    EXPECT_FALSE(world.cast({}).hit);
+    EXPECT_TRUE(world.bounds().empty());
+    const auto frame = world.frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_EQ(frame->lights.size(), 1u);
+}
+
+TEST(World, ChangesShowAtOnceAndStaleIdsAreRefused) {
+    World world;
+    const auto a = world.add(ball(1));
+    ASSERT_TRUE(a);
+    EXPECT_EQ(world.distance({0, 3, 0}), 2);
+    ASSERT_TRUE(world.change(*a, ball(2)));
+    EXPECT_EQ(world.distance({0, 3, 0}), 1);
+    const auto b = world.add(ball(1, {0, 5, 0}));
+    ASSERT_TRUE(b);
+    ASSERT_TRUE(world.remove(*a));
+    EXPECT_EQ(world.find(*a), nullptr);
+    EXPECT_FALSE(world.change(*a, ball(1)));
+    EXPECT_FALSE(world.remove(*a));
+    EXPECT_EQ(world.distance({0, 3, 0}), 1);
+    const auto c = world.add(ball(1, {9, 0, 0}));
+    ASSERT_TRUE(c);
+    EXPECT_NE(*c, *a) << "a slot used again has another generation";
+    EXPECT_EQ(world.edits(), (std::vector<EditId>{*b, *c}));
+    EXPECT_EQ(world.find_edit(world.find(*c)->name), *c);
+}
+
+TEST(World, RefusesWhatTheReaderRefuses) {
+    World world;
+    EXPECT_FALSE(world.add(ball(0)));
+    EXPECT_FALSE(world.add(ball(-1)));
+    EXPECT_FALSE(world.add(ball(std::nanf(""))));
+    EXPECT_FALSE(world.add(ball(1e20f)));
+    EXPECT_FALSE(world.add(ball(1, {INFINITY, 0, 0})));
+    Edit e = ball(1);
+    e.node.transform.scale = {1, 0, 1};
+    EXPECT_FALSE(world.add(e));
+    e = ball(1);
+    e.node.transform.rotation = {0, 0, 0, 0};
+    EXPECT_FALSE(world.add(e));
+    e = ball(1);
+    e.node.material = {3, 0};
+    EXPECT_FALSE(world.add(e));
+    e = ball(1);
+    e.op = Op::Paint;
+    EXPECT_FALSE(world.add(e));
+    e = ball(1);
+    e.node.kind = Node::Kind::Object;
+    EXPECT_FALSE(world.add(e));
+    e = ball(1);
+    e.node.domain.push_back(Repeat{.spacing = {0.5f, 0, 0}});
+    EXPECT_FALSE(world.add(e));
+    EXPECT_TRUE(world.edits().empty());
+    e = ball(1);
+    e.name = "a";
+    ASSERT_TRUE(world.add(e));
+    EXPECT_FALSE(world.add(e)) << "names are unique";
+}
+
+TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
+    World world;
+    world.field_settings = {
+        .voxel_size = 0.05f, .cells = 64, .levels = 1, .bounds = Box3{{-3, -3, -3}, {3, 3, 3}}, .distance_8bit = false};
+    const auto a = world.add(ball(1));
+    ASSERT_TRUE(a);
+    const auto first = world.frame();
+    ASSERT_TRUE(first);
+    Edit cut = ball(0.5f, {1, 0, 0});
+    cut.op = Op::Subtract;
+    ASSERT_TRUE(world.add(cut));
+    const auto second = world.frame();
+    ASSERT_TRUE(second);
+    EXPECT_EQ(second->field->parent_revision(), first->field->revision()) << "updated, not built again";
+    World fresh;
+    fresh.field_settings = world.field_settings;
+    ASSERT_TRUE(fresh.add(ball(1)));
+    ASSERT_TRUE(fresh.add(cut));
+    const auto built = fresh.frame();
+    ASSERT_TRUE(built);
+    EXPECT_EQ(second->field->stats().bricks, built->field->stats().bricks);
+    for (const field::BrickRecord& r : built->field->records()) {
+        if (r.code_count == 0) continue;
+        const int x = r.texel_x / field::kBrickVoxels, y = r.texel_y / field::kBrickVoxels,
+                  z = r.texel_z / field::kBrickVoxels;
+        EXPECT_NE(second->field->cell_word(x, y, z) & field::kCellOccupied, 0u);
+    }
+    EXPECT_EQ(first->field->stats().bricks, world.frame()->field == first->field ? 0u : first->field->stats().bricks)
+        << "old snapshots stay";
+}
+
+TEST(World, TooLargeForThePoolIsCoarserAndSaysSo) {
+    World world;
+    world.field_settings.voxel_size = 0.001f;
+    ASSERT_TRUE(world.add(ball(40)));
+    const auto frame = world.frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_GT(frame->coarsened, 0);
+    EXPECT_GT(frame->field->stats().bricks, 0u);
+    EXPECT_NEAR(double(frame->field->options().voxel_size), 0.001 * std::pow(2, frame->coarsened), 1e-6);
+    EXPECT_NE(world.inspect_json().find("\"coarsened\": " + std::to_string(frame->coarsened)), std::string::npos);
+}
+
+TEST(World, FramesTheSceneWhenItHasNoCamera) {
+    World world;
+    ASSERT_TRUE(world.add(ball(2, {10, 0, 0})));
+    const auto frame = world.frame();
+    ASSERT_TRUE(frame);
+    const vec3 to = vec3{10, 0, 0} - frame->camera.position;
+    EXPECT_NEAR(dot(normalize(to), normalize(frame->camera.target - frame->camera.position)), 1, 1e-4);
+    const float half_view = 0.5f * frame->camera.fov_y_deg * 3.14159265f / 180;
+    EXPECT_LT(std::asin(2 / length(to)), half_view) << "all of it is seen";
+    EXPECT_FALSE(world.frame("main"));
+}
+
+TEST(World, MaterialsBlendTheirNumbersRight) {
+    auto world = World::parse(scene_with("{\"shape\": \"sphere\", \"radius\": 1}, {\"shape\": \"sphere\", \"radius\": "
+                                         "1, \"position\": [5, 0, 0], \"material\": \"b\"}",
+                                         "\"materials\": {\"a\": {}, \"b\": {\"roughness\": 0.1}}"),
+                              "s.json");
+    ASSERT_TRUE(world);
+    EXPECT_FALSE(world->sample({0, 1, 0}).material) << "no material: the default grey";
+    EXPECT_EQ(world->material_name(world->sample({5, 1, 0}).material), "b");
+    EXPECT_EQ(world->frame()->materials.size(), 3u);
+}
+
+TEST(World, HeightfieldsReadTheirImage) {
+    const image::Pixels ramp{.width = 2, .height = 2, .channels = 1, .bits = 16, .values = {0, 65535, 0, 65535}};
+    ASSERT_TRUE(image::write_png(folder + "/ramp.png", ramp));
+    std::ofstream(folder + "/ramp.kiln.json")
+        << scene_with("{\"shape\": \"heightfield\", \"file\": \"ramp.png\", \"size\": 4, \"height\": 2}");
+    const auto ground = World::load(folder + "/ramp.kiln.json");
+    ASSERT_TRUE(ground) << ground.error().message;
+    EXPECT_LT(std::abs(ground->distance({1, 1.5f, 0})), 1e-4f) << "the number 0.75 at three quarters of the way";
+    EXPECT_LT(ground->distance({1, 1.4f, 0}), 0);
+    EXPECT_GT(ground->distance({-1, 0.6f, 0}), 0);
+    const std::string scene = folder + "/h.kiln.json";
+    std::ofstream(scene) << scene_with("{\"shape\": \"heightfield\", \"file\": \"missing.png\"}");
+    const auto world = World::load(scene);
+    ASSERT_FALSE(world);
+    EXPECT_THAT(world.error().message, testing::StartsWith(scene + ":1:"));
+    EXPECT_THAT(world.error().message, testing::HasSubstr("missing.png"));
+    EXPECT_EQ(world.error().kind, ErrorKind::Input);
+}
+
+TEST(World, NearestWord) {
+    const std::string_view known[] = {"union", "subtract", "intersect", "paint"};
+    EXPECT_EQ(nearest_word("substract", known), "subtract");
+    EXPECT_EQ(nearest_word("pianr", known), "paint");
+    EXPECT_EQ(nearest_word("sub", known), "subtract");
+    EXPECT_EQ(nearest_word("xyz", known), "");
+    EXPECT_EQ(nearest_word("", known), "");
+}
+
+// KILN_MILLION=1 for the full size; a fifth of it takes seconds.
+TEST(WorldSlow, HundredsOfThousandsOfEditsLoad) {
+    const int count = std::getenv("KILN_MILLION") ? 1000000 : 200000;
+    std::string edits;
+    for (int i = 0; i < count; ++i)
+        edits += (i ? "," : "") + std::string("{\"shape\":\"sphere\",\"radius\":0.3,\"position\":[") +
+                 std::to_string(i % 100) + "," + std::to_string(i / 100 % 100) + "," + std::to_string(i / 10000) + "]}";
+    const auto world = World::parse(scene_with(edits), "s.json");
+    ASSERT_TRUE(world) << world.error().message;
+    EXPECT_EQ(world->edits().size(), size_t(count));
+    EXPECT_NEAR(world->distance({0, 1, -1}), 0.7f, 1e-5f);
+    const auto frame = world->frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+}
+
+}  // namespace
+}  // namespace kiln
