@@ -72,7 +72,9 @@ Use ValidateEncoder::part(const TexturePlace& place, const TextureInfo& t, Exten
     return {.buffer = {},
             .texture = place.texture,
             .range = {place.mip, 1, volume ? 0 : place.origin.z, volume ? 1 : size.depth},
-            .access = a};
+            .access = a,
+            .at = place.origin,
+            .size = size};
 }
 
 // ---- passes

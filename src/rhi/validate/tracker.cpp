@@ -4,6 +4,8 @@
 #include "base/format.h"
 #include "rhi/texture_math.h"
 
+#include <algorithm>
+
 namespace kiln::rhi::validate {
 
 namespace {
@@ -71,6 +73,23 @@ std::string Tracker::use(State& s, Access access, const std::string& what) {
         return formatted("{} is used as {} after it was written as {}, without a barrier between", what, name(access),
                          name(s.used));
     s.used |= access;
+    return {};
+}
+
+std::string Tracker::use_texture(State& s, const Use& u, const std::string& what) {
+    if (u.access != Access::CopyWrite || u.size == Extent{0, 0, 0}) return use(s, u.access, what);
+    const auto apart = [](uint32_t a, uint32_t n, uint32_t b, uint32_t m) { return a + n <= b || b + m <= a; };
+    const bool beside = s.used == Access::CopyWrite && !s.pieces.empty() &&
+                        std::all_of(s.pieces.begin(), s.pieces.end(), [&](const Use& p) {
+                            return apart(p.at.x, p.size.width, u.at.x, u.size.width) ||
+                                   apart(p.at.y, p.size.height, u.at.y, u.size.height) ||
+                                   apart(p.at.z, p.size.depth, u.at.z, u.size.depth);
+                        });
+    if (!beside) {
+        std::string fault = use(s, u.access, what);
+        if (!fault.empty()) return fault;
+    }
+    s.pieces.push_back(u);
     return {};
 }
 
@@ -160,7 +179,7 @@ std::vector<std::string> Tracker::play(const Recording& recording) {
                 for (uint32_t mip = r.base_mip; mip < r.base_mip + r.mip_count; ++mip) {
                     State& s = states[mip + layer * info->desc.mips];
                     const std::string text = e.is_barrier ? barrier(s, e.barrier, true, name_of(*info, mip, layer))
-                                                          : use(s, e.use.access, name_of(*info, mip, layer));
+                                                          : use_texture(s, e.use, name_of(*info, mip, layer));
                     if (!said) fault(text);
                     said = said || !text.empty();
                 }

@@ -15,6 +15,8 @@ struct Use {
     TextureHandle texture;
     Subresources range;  // counts resolved
     Access access = Access::Undefined;
+    Origin at = {};   // of a copy into a texture: the texels it writes; size (0, 0, 0): not said
+    Extent size = {0, 0, 0};
 };
 
 // A recorded step: a use or a barrier, and where it stands.
@@ -53,9 +55,12 @@ private:
         Access allowed = Access::Undefined;  // `after` of the last barrier
         Access used = Access::Undefined;     // since then
         bool settled = false;                // no work is under way: the first use needs no barrier
+        std::vector<Use> pieces = {};        // copies into parts of it since then, when there was nothing else
     };
 
     std::string use(State& state, Access access, const std::string& what);
+    // Copies that write different texels need no barrier between them.
+    std::string use_texture(State& state, const Use& use, const std::string& what);
     std::string barrier(State& state, const Barrier& b, bool is_texture, const std::string& what);
     // Resources in the same memory as the one that a barrier brings to life: their contents end here.
     std::string end_aliases(HeapHandle heap, uint64_t begin, uint64_t end, const Barrier& b, const std::string& what);
