@@ -19,20 +19,23 @@ bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::is
 Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& settings, const GpuField& field) {
     const auto [width, height] = std::pair{settings.width, settings.height};
     if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide) {
-        return Error{formatted("a picture of {} x {} pixels; each side is 1 to {}", width, height, kLargestSide), ErrorKind::Usage};
+        return Error{formatted("a picture of {} x {} pixels; each side is 1 to {}", width, height, kLargestSide),
+                     ErrorKind::Usage};
     }
     const Camera& camera = frame.camera;
     if (!finite(camera.position) || !finite(camera.target) || !finite(camera.up)) {
         return Error{"the camera's position, target and up must be finite numbers", ErrorKind::Usage};
     }
     if (!(camera.fov_y_deg > 0 && camera.fov_y_deg < 180)) {
-        return Error{formatted("a camera with fov_y_deg {}; it is above 0 and below 180", camera.fov_y_deg), ErrorKind::Usage};
+        return Error{formatted("a camera with fov_y_deg {}; it is above 0 and below 180", camera.fov_y_deg),
+                     ErrorKind::Usage};
     }
     if (!(camera.exposure > 0) || !std::isfinite(camera.exposure)) {
         return Error{formatted("a camera with exposure {}; it is above 0", camera.exposure), ErrorKind::Usage};
     }
     const vec3 look = camera.target - camera.position;
-    if (!(dot(look, look) > 0)) return Error{"the camera's target is its position; it must be elsewhere", ErrorKind::Usage};
+    if (!(dot(look, look) > 0))
+        return Error{"the camera's target is its position; it must be elsewhere", ErrorKind::Usage};
 
     FrameParams p{};
     p.grid = field.grid();
@@ -41,7 +44,8 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     int whole[3];
     float part[3];
     for (int i = 0; i < 3; ++i) {
-        if (std::fabs(eye[i]) > 1e9) return Error{"the camera is more than 1e9 voxels from the origin", ErrorKind::Usage};
+        if (std::fabs(eye[i]) > 1e9)
+            return Error{"the camera is more than 1e9 voxels from the origin", ErrorKind::Usage};
         whole[i] = int(std::floor(eye[i]));
         part[i] = float(eye[i] - std::floor(eye[i]));
     }
@@ -72,7 +76,8 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
 std::vector<MaterialRecord> material_records(const Frame& frame) {
     std::vector<MaterialRecord> out;
     for (const Material& m : frame.materials) {
-        out.push_back({m.base_color.x, m.base_color.y, m.base_color.z, m.roughness, m.emissive.x, m.emissive.y, m.emissive.z, m.metallic});
+        out.push_back({m.base_color.x, m.base_color.y, m.base_color.z, m.roughness, m.emissive.x, m.emissive.y,
+                       m.emissive.z, m.metallic});
     }
     if (out.empty()) {
         const Material m;

@@ -14,9 +14,9 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
 std::vector<MaterialRecord> material_records(const Frame& frame);
 
 struct TileResult {
-    Readback radiance;  // 4 halves a pixel; of a view: 4 floats
-    Readback shown;     // 4 bytes a pixel
-    Readback depth;     // a float a pixel
+    Readback radiance;    // 4 halves a pixel; of a view: 4 floats
+    Readback shown;       // 4 bytes a pixel
+    Readback depth;       // a float a pixel
     Readback visibility;  // 4 words a pixel; only when asked for
     std::vector<Readback> evaluations;
 };

@@ -54,8 +54,10 @@ GpuField::~GpuField() {
 Result<void> GpuField::reserve(Storage& storage, std::string_view name, uint64_t bytes, bool& kept) {
     const uint64_t most = std::min(device_->limits().max_storage_binding, device_->limits().max_buffer);
     if (bytes > most) {
-        return Error{formatted("the field's {} need {} bytes, a buffer of this device holds {}; a larger voxel size would fit", name, bytes, most),
-                     ErrorKind::OutOfMemory};
+        return Error{
+            formatted("the field's {} need {} bytes, a buffer of this device holds {}; a larger voxel size would fit",
+                      name, bytes, most),
+            ErrorKind::OutOfMemory};
     }
     kept = storage.bytes >= std::max<uint64_t>(bytes, 16);
     if (kept) return {};
@@ -73,7 +75,8 @@ Result<void> GpuField::reserve(Storage& storage, std::string_view name, uint64_t
 }
 
 // Writes `bytes`, leaving out blocks equal to `old` (what the buffer holds there).
-Result<void> GpuField::write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes, std::span<const std::byte> old) {
+Result<void> GpuField::write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes,
+                             std::span<const std::byte> old) {
     const auto same = [&](uint64_t at, uint64_t n) {
         return at + n <= old.size() && std::memcmp(bytes.data() + at, old.data() + at, n) == 0;
     };
@@ -89,7 +92,8 @@ Result<void> GpuField::write(const Storage& storage, uint64_t offset, std::span<
             if (same(end, m)) break;
             end += m;
         }
-        if (auto written = device_->write_buffer(storage.handle, offset + at, bytes.subspan(at, end - at)); !written) return written;
+        if (auto written = device_->write_buffer(storage.handle, offset + at, bytes.subspan(at, end - at)); !written)
+            return written;
         at = end;
     }
     return {};
@@ -127,26 +131,30 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
     const uint64_t texels = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kBrickTexelCount;
     const uint64_t bytes = texels * (rhi::bytes_per_texel(format) + 2);
     if (bricks_z_ > side || bytes > kMaxAtlasBytes) {
-        return Error{formatted("the atlas of {} bricks needs {} bytes, at most {} are given to it; a larger voxel size would fit", slots, bytes,
-                               kMaxAtlasBytes),
-                     ErrorKind::OutOfMemory};
+        return Error{
+            formatted(
+                "the atlas of {} bricks needs {} bytes, at most {} are given to it; a larger voxel size would fit",
+                slots, bytes, kMaxAtlasBytes),
+            ErrorKind::OutOfMemory};
     }
     using rhi::TextureUsage;
     const rhi::Extent size{bricks_x_ * 8, bricks_y_ * 8, bricks_z_ * 8};
-    auto distances = device_->create_texture(
-        {.dimension = rhi::Dimension::D3,
-         .format = format,
-         .size = size,
-         .usage = TextureUsage::Sampled | TextureUsage::CopySrc | (baker == Baker::Storage ? TextureUsage::Storage : TextureUsage::CopyDst),
-         .label = "atlas distances"});
+    auto distances =
+        device_->create_texture({.dimension = rhi::Dimension::D3,
+                                 .format = format,
+                                 .size = size,
+                                 .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
+                                          (baker == Baker::Storage ? TextureUsage::Storage : TextureUsage::CopyDst),
+                                 .label = "atlas distances"});
     if (!distances) return distances.error();
     distances_ = *distances;
-    auto materials = device_->create_texture({.dimension = rhi::Dimension::D3,
-                                              .format = rhi::Format::R32Uint,
-                                              .size = {size.width / 2, size.height, size.depth},
-                                              .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
-                                                       (baker == Baker::Host ? TextureUsage::CopyDst : TextureUsage::Storage),
-                                              .label = "atlas materials"});
+    auto materials =
+        device_->create_texture({.dimension = rhi::Dimension::D3,
+                                 .format = rhi::Format::R32Uint,
+                                 .size = {size.width / 2, size.height, size.depth},
+                                 .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
+                                          (baker == Baker::Host ? TextureUsage::CopyDst : TextureUsage::Storage),
+                                 .label = "atlas materials"});
     if (!materials) return materials.error();
     materials_ = *materials;
     auto palettes = device_->create_buffer(
@@ -175,7 +183,8 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
         concave = concave && edit.op == Op::Union && (edits == 1 || edit.reach == 0);
         for (const sdf::Instruction in : code) {
             if (in.opcode() == sdf::Opcode::Shape) concave = concave && in.aux() == uint32_t(ShapeKind::Plane);
-            const bool keeps_straight = in.opcode() <= sdf::Opcode::PointAffineOn || in.opcode() == sdf::Opcode::Shape || in.opcode() == sdf::Opcode::Combine;
+            const bool keeps_straight = in.opcode() <= sdf::Opcode::PointAffineOn ||
+                                        in.opcode() == sdf::Opcode::Shape || in.opcode() == sdf::Opcode::Combine;
             concave = concave && keeps_straight;
         }
     }
@@ -192,8 +201,8 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
         next->options().format == field::DistanceFormat::Half ? rhi::Format::R16Float : rhi::Format::R8Snorm;
     if (baker == Baker::Auto) baker = device_->info().kind == rhi::DeviceKind::Cpu ? Baker::Host : Baker::Storage;
     if (baker == Baker::Storage && !device_->caps().storage_r16f) baker = Baker::Copy;
-    const bool same_atlas = distances_ && format == format_ && baker == baker_ &&
-                            next->slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
+    const bool same_atlas =
+        distances_ && format == format_ && baker == baker_ && next->slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
     const bool here = field_ && same_atlas && next->revision() == field_->revision();
     if (here) return {};
     const bool grown_from_here = field_ && same_atlas && next->parent_revision() == field_->revision();
@@ -228,11 +237,13 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     const std::vector<float>& new_samples = next->program().samples;
     const std::vector<float>& new_params = next->program().params;
     bool kept = false;
-    if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r) return fail(r.error());
+    if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r)
+        return fail(r.error());
     kept = kept && old && old->program().samples.size() == new_samples.size();
     const uint64_t params_at = new_samples.size() * sizeof(float);
     const std::span<const std::byte> nothing;
-    if (auto r = write(numbers_, 0, bytes_of(new_samples), kept ? bytes_of(old->program().samples) : nothing); !r) return fail(r.error());
+    if (auto r = write(numbers_, 0, bytes_of(new_samples), kept ? bytes_of(old->program().samples) : nothing); !r)
+        return fail(r.error());
     if (auto r = write(numbers_, params_at, bytes_of(new_params), kept ? bytes_of(old->program().params) : nothing); !r)
         return fail(r.error());
     if (!dropped_) {
@@ -313,8 +324,10 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
             const size_t job = size_t(i);
             const field::BrickRecord& record = field_->records()[slice[job]];
             field::BrickTexels texels;
-            field::bake_brick(*field_, {slice[job], {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count},
-                              texels);
+            field::bake_brick(
+                *field_,
+                {slice[job], {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count},
+                texels);
             for (size_t row = 0; row < 64; ++row) {
                 std::byte* const to = codes.data() + packed_at(job, row, 8 * code_bytes);
                 for (size_t x = 0; x < 8; ++x) {
@@ -331,7 +344,9 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
             size_t n = 1;
             while (i + n < slice.size() && slice[i + n] == slice[i] + n) ++n;
             const auto run = std::span(palettes).subspan(i * field::kPaletteSize, n * field::kPaletteSize);
-            if (auto r = device_->write_buffer(palettes_, uint64_t{slice[i]} * field::kPaletteSize * 4, bytes_of(run)); !r) return r;
+            if (auto r = device_->write_buffer(palettes_, uint64_t{slice[i]} * field::kPaletteSize * 4, bytes_of(run));
+                !r)
+                return r;
             i += n;
         }
         Graph graph(*runner_);

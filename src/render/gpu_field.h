@@ -21,7 +21,7 @@ struct FieldHandles {
 
 // Who bakes, and how the distances get into the atlas.
 enum class Baker : uint8_t {
-    Auto,     // Storage where the device can; Host on software devices, whose shaders run many times slower than our SIMD
+    Auto,  // Storage where the device can; Host on software devices, whose shaders run many times slower than our SIMD
     Storage,  // the GPU, to a storage texture (Copy where the device has none of the format)
     Copy,     // the GPU, to a buffer that is copied
     Host,     // the CPU; texels are copied
@@ -40,21 +40,23 @@ public:
     FieldHandles import(Graph& graph) const;
 
     const field::Field* field() const { return field_.get(); }
-    field::GridParams grid() const;                     // with the atlas layout filled in
-    float distance_scale() const;                  // voxels a unit of the atlas
+    field::GridParams grid() const;  // with the atlas layout filled in
+    float distance_scale() const;    // voxels a unit of the atlas
     bool leaves_grid() const { return outside_count_ != 0; }
     // Nothing but half-spaces, in hard unions, leaves the grid: along any ray the field there is a concave function.
     bool outside_is_concave() const { return outside_is_concave_; }
     // What can occur on the tapes; everything, on GPUs. `outside`: on the tape of what leaves the grid alone.
     const TapeUse& use(bool outside) const { return outside ? outside_use_ : use_; }
-    uint32_t params_first() const;                 // in the numbers buffer
-    uint32_t outside_first() const;                // in the program buffer
+    uint32_t params_first() const;   // in the numbers buffer
+    uint32_t outside_first() const;  // in the program buffer
     uint32_t outside_count() const { return outside_count_; }
     uint32_t program_count() const { return program_count_; }
     uint64_t atlas_bytes() const;
     uint32_t bricks_baked() const { return bricks_baked_; }  // by the last update()
-    double bake_ms() const { return bake_ms_; }              // GPU time of the last update() (Host: wall time); 0: nothing was baked
-    Result<uint32_t> dropped_materials();                    // that found no place in a palette of 16, so far; waits
+    double bake_ms() const {
+        return bake_ms_;
+    }                                      // GPU time of the last update() (Host: wall time); 0: nothing was baked
+    Result<uint32_t> dropped_materials();  // that found no place in a palette of 16, so far; waits
 
     // What is stored, for tests: distance codes (16 or 8 bits each) and material words of a brick, in order x, y, z.
     struct BrickTexels {
@@ -69,8 +71,10 @@ private:
         uint64_t bytes = 0;
     };
     Result<void> reserve(Storage& storage, std::string_view name, uint64_t bytes, bool& kept);
-    Result<void> write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes, std::span<const std::byte> old);
-    Result<void> store(Storage& storage, std::string_view name, std::span<const std::byte> bytes, std::span<const std::byte> old);
+    Result<void> write(const Storage& storage, uint64_t offset, std::span<const std::byte> bytes,
+                       std::span<const std::byte> old);
+    Result<void> store(Storage& storage, std::string_view name, std::span<const std::byte> bytes,
+                       std::span<const std::byte> old);
     Result<void> make_atlas(uint32_t slots, rhi::Format format, Baker baker);
     void drop_atlas();
     Result<void> bake(std::span<const uint32_t> slots);

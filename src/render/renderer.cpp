@@ -47,7 +47,8 @@ struct Renderer::Impl {
 
     Result<void> prepare();
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
-    Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture);
+    Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
+                             Picture& picture);
     // The switches of a frame; its resources are still to come.
     TileInputs inputs(const RenderSettings& settings) const {
         TileInputs in;
@@ -84,7 +85,8 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
     stats.frame_ms += times.total_ms;
     for (const PassTime& pass : times.passes) {
         const std::string name = pass.name.substr(0, pass.name.find(" ["));  // without what a kernel is specialised for
-        const auto same = std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == name; });
+        const auto same =
+            std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == name; });
         if (same != stats.passes.end()) {
             same->second += pass.ms;
         } else {
@@ -93,7 +95,8 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
     }
 }
 
-Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params, Picture& picture) {
+Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
+                                         Picture& picture) {
     Graph g(*runner);
     TileInputs in = inputs(settings);
     in.field = field->import(g);
@@ -139,8 +142,10 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
-    if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated) return updated.error();
-    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(settings), settings.view)); !warm) return warm.error();
+    if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated)
+        return updated.error();
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(settings), settings.view)); !warm)
+        return warm.error();
 
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
@@ -175,7 +180,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
-    if (runner->pipelines().made_late() != late) log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
+    if (runner->pipelines().made_late() != late)
+        log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
     if (auto ok = healthy(); !ok) return ok.error();
     return picture;
 }
@@ -194,7 +200,9 @@ Result<Renderer> Renderer::create(const RendererOptions& options) {
     return Renderer(std::move(impl));
 }
 
-Result<Picture> Renderer::render(const Frame& frame, const RenderSettings& settings) { return impl_->render(frame, settings); }
+Result<Picture> Renderer::render(const Frame& frame, const RenderSettings& settings) {
+    return impl_->render(frame, settings);
+}
 
 const RenderStats& Renderer::stats() const { return impl_->stats; }
 

@@ -22,8 +22,8 @@ namespace {
 
 // Where the jobs' bricks go, as runs of bricks that lie side by side in the buffer and in the atlas. A brick's row of 8 texels is
 // `row_bytes` in the buffer and `row_texels` in the texture.
-std::vector<CopyRegion> copy_regions(std::span<const uint32_t> slots, uint32_t bricks_x, uint32_t bricks_y, uint32_t row_bytes,
-                                     uint32_t row_texels = 8) {
+std::vector<CopyRegion> copy_regions(std::span<const uint32_t> slots, uint32_t bricks_x, uint32_t bricks_y,
+                                     uint32_t row_bytes, uint32_t row_texels = 8) {
     const uint32_t side_by_side = uint32_t(kBakeCopyBytes) / row_bytes;
     std::vector<CopyRegion> out;
     for (uint32_t job = 0; job < slots.size();) {
@@ -33,11 +33,13 @@ std::vector<CopyRegion> copy_regions(std::span<const uint32_t> slots, uint32_t b
             ++run;
         }
         const uint32_t slot = slots[job];
-        out.push_back({.buffer_offset = uint64_t{job / side_by_side} * kBakeCopyRows * kBakeCopyBytes + uint64_t{job % side_by_side} * row_bytes,
-                       .bytes_per_row = uint32_t(kBakeCopyBytes),
-                       .rows_per_layer = 8,
-                       .origin = {slot % bricks_x * row_texels, slot / bricks_x % bricks_y * 8, slot / (bricks_x * bricks_y) * 8},
-                       .size = {run * row_texels, 8, 8}});
+        out.push_back(
+            {.buffer_offset = uint64_t{job / side_by_side} * kBakeCopyRows * kBakeCopyBytes +
+                              uint64_t{job % side_by_side} * row_bytes,
+             .bytes_per_row = uint32_t(kBakeCopyBytes),
+             .rows_per_layer = 8,
+             .origin = {slot % bricks_x * row_texels, slot / bricks_x % bricks_y * 8, slot / (bricks_x * bricks_y) * 8},
+             .size = {run * row_texels, 8, 8}});
         job += run;
     }
     return out;
@@ -52,8 +54,8 @@ const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use) 
     return specialised(half ? kBakeHalf : kBakeSnorm8, use);
 }
 
-void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy,
-                 const TapeUse& use) {
+void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
+                 bool by_copy, const TapeUse& use) {
     const Buffer jobs = g.upload("bake jobs", slots);
     const Groups groups{uint32_t(slots.size()), 1, 1};
     if (!by_copy) {
@@ -71,12 +73,14 @@ void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, con
                {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.palettes),
                 g.read_write(f.dropped), g.write(f.materials), g.write(codes)},
                push);
-    g.copy(codes, f.distances, copy_regions(slots, push.atlas_bricks_x_y & 0xffffu, push.atlas_bricks_x_y >> 16, row_bytes));
+    g.copy(codes, f.distances,
+           copy_regions(slots, push.atlas_bricks_x_y & 0xffffu, push.atlas_bricks_x_y >> 16, row_bytes));
 }
 
 size_t packed_at(size_t job, size_t row, size_t row_bytes) {
     const size_t side_by_side = size_t(kBakeCopyBytes) / row_bytes;
-    return ((job / side_by_side) * size_t(kBakeCopyRows) + row) * size_t(kBakeCopyBytes) + job % side_by_side * row_bytes;
+    return ((job / side_by_side) * size_t(kBakeCopyRows) + row) * size_t(kBakeCopyBytes) +
+           job % side_by_side * row_bytes;
 }
 
 size_t packed_bytes(size_t jobs, size_t row_bytes) {
@@ -88,7 +92,8 @@ void store_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, st
                   std::span<const std::byte> words, uint32_t atlas_bricks_x_y, rhi::Format format) {
     const uint32_t bricks_x = atlas_bricks_x_y & 0xffffu;
     const uint32_t bricks_y = atlas_bricks_x_y >> 16;
-    g.copy(g.upload("host codes", codes), f.distances, copy_regions(slots, bricks_x, bricks_y, 8 * rhi::bytes_per_texel(format)));
+    g.copy(g.upload("host codes", codes), f.distances,
+           copy_regions(slots, bricks_x, bricks_y, 8 * rhi::bytes_per_texel(format)));
     g.copy(g.upload("host words", words), f.materials, copy_regions(slots, bricks_x, bricks_y, 16, 4));
 }
 

@@ -25,25 +25,25 @@ struct FrameParams {
     float eye_part_x, eye_part_y, eye_part_z;  // and where in it, [0, 1)
     float pixel_angle;                         // radians between neighbouring pixels at the middle of the picture
     CameraParams camera;
-    int width, height;                         // pixels of the whole picture
-    int tile_x, tile_y;                        // of this tile's first pixel
+    int width, height;   // pixels of the whole picture
+    int tile_x, tile_y;  // of this tile's first pixel
     int tile_width, tile_height;
-    uint flags;                                // kFrame…
+    uint flags;  // kFrame…
     uint light_count;
-    uint outside_first, outside_count;         // code of what leaves the grid, in the program buffer; count 0: nothing does
-    uint program_count;                        // code of the whole program, from the program buffer's start
-    uint params_first;                         // of Program::params in the numbers buffer
+    uint outside_first, outside_count;  // code of what leaves the grid, in the program buffer; count 0: nothing does
+    uint program_count;                 // code of the whole program, from the program buffer's start
+    uint params_first;                  // of Program::params in the numbers buffer
     SkyParams sky;
     float exposure;
-    uint tone_map;                             // kiln::ToneMap
-    uint view;                                 // kiln::View
+    uint tone_map;  // kiln::ToneMap
+    uint view;      // kiln::View
     uint material_count;
 };
 
-KILN_CONST uint kFrameAccelerate = 1u;  // jump over empty cells
-KILN_CONST uint kFrameRays = 2u;        // rays come from the rays buffer instead of the camera
-KILN_CONST uint kFrameAnalytic = 4u;    // march the pruned programs of the cells
-KILN_CONST uint kFrameUnpruned = 8u;    // march the whole program
+KILN_CONST uint kFrameAccelerate = 1u;       // jump over empty cells
+KILN_CONST uint kFrameRays = 2u;             // rays come from the rays buffer instead of the camera
+KILN_CONST uint kFrameAnalytic = 4u;         // march the pruned programs of the cells
+KILN_CONST uint kFrameUnpruned = 8u;         // march the whole program
 KILN_CONST uint kFrameOutsideConcave = 16u;  // half-spaces alone leave the grid: their field is concave along a ray
 
 // A ray given from outside (tests, queries): origin in voxels, unit direction.

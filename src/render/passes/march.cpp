@@ -11,7 +11,8 @@ const Kernel kMarchExact{"march exact", kMarchExactSpv};
 
 Visibility march(Graph& g, const TileInputs& in) {
     Visibility out;
-    const uint32_t groups = ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
+    const uint32_t groups =
+        ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
     const FieldHandles& f = in.field;
     Image words = g.create("visibility", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     if (in.analytic) {
@@ -19,15 +20,16 @@ Visibility march(Graph& g, const TileInputs& in) {
     } else {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
         g.dispatch(kMarch, in.size,
-                   {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words), g.write(counted)});
+                   {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words),
+                    g.write(counted)});
         out.evaluations.push_back(counted);
     }
     if (in.exact) {
         Image both = g.create("visibility exact", {.size = in.size, .format = rhi::Format::Rgba32Uint});
         Buffer counted = g.create_buffer("march exact evaluations", uint64_t{groups} * 4);
         g.dispatch(specialised(kMarchExact, in.use), in.size,
-                   {g.uniform(in.frame), g.read(f.cells), g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers),
-                    g.read(in.rays), g.read(words), g.write(both), g.write(counted)});
+                   {g.uniform(in.frame), g.read(f.cells), g.read(f.records), g.read(f.code), g.read(f.program),
+                    g.read(f.numbers), g.read(in.rays), g.read(words), g.write(both), g.write(counted)});
         out.evaluations.push_back(counted);
         words = both;
     }

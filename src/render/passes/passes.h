@@ -17,8 +17,8 @@ extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kLight, kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
-void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format, bool by_copy,
-                 const TapeUse& use);
+void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
+                 bool by_copy, const TapeUse& use);
 
 // Texels made elsewhere into the atlas. Row r (y + 8 z) of job i's brick is at packed_at(i, r, bytes of a row) of `codes` and `words`:
 // rows of 256 bytes, as many bricks side by side as fit, so that every device can copy them.
@@ -32,15 +32,15 @@ const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
 // What every pass of one tile reads.
 struct TileInputs {
     FieldHandles field;
-    Block frame;             // FrameParams
-    Buffer rays;             // FrameRay a pixel; a dummy unless kFrameRays
-    Buffer materials;        // MaterialRecord
-    Buffer lights;           // LightRecord
+    Block frame;       // FrameParams
+    Buffer rays;       // FrameRay a pixel; a dummy unless kFrameRays
+    Buffer materials;  // MaterialRecord
+    Buffer lights;     // LightRecord
     Buffer ggx_table;
     uint32_t light_count = 0;
-    rhi::Extent size;        // of the tile
-    bool exact = false;      // some code is marched: analytic, or edits leave the grid
-    bool analytic = false;   // … instead of the bricks
+    rhi::Extent size;       // of the tile
+    bool exact = false;     // some code is marched: analytic, or edits leave the grid
+    bool analytic = false;  // … instead of the bricks
     TapeUse use;
 };
 

@@ -26,11 +26,15 @@ struct Specialised {
 TapeUse tape_use(std::span<const sdf::Instruction> code) {
     using sdf::Opcode;
     // What pruning may put in the place of a Combine.
-    TapeUse use{.shapes = 0, .warps = 0, .opcodes = bit(Opcode::Move) | bit(Opcode::Negate) | bit(Opcode::Take) | bit(Opcode::Constant), .registers = 1};
+    TapeUse use{.shapes = 0,
+                .warps = 0,
+                .opcodes = bit(Opcode::Move) | bit(Opcode::Negate) | bit(Opcode::Take) | bit(Opcode::Constant),
+                .registers = 1};
     for (const sdf::Instruction in : code) {
         use.opcodes |= bit(in.opcode());
         if (in.opcode() == Opcode::Shape) use.shapes |= bit(in.aux());
-        if (in.opcode() == Opcode::PointWarp || in.opcode() == Opcode::PointCopy || in.opcode() == Opcode::Value) use.warps |= bit(in.aux());
+        if (in.opcode() == Opcode::PointWarp || in.opcode() == Opcode::PointCopy || in.opcode() == Opcode::Value)
+            use.warps |= bit(in.aux());
         use.registers = std::max({use.registers, in.dst() + 1, in.a() + 1, in.b() + 1});
     }
     return use;
@@ -45,13 +49,15 @@ const Kernel& specialised(const Kernel& kernel, const TapeUse& use) {
     static std::mutex mutex;
     static std::map<std::string, std::unique_ptr<Specialised>> made;
     const std::lock_guard lock(mutex);
-    const std::string name = formatted("{} [{:x} {:x} {:x} {}]", kernel.name, use.shapes, use.warps, use.opcodes, use.registers);
+    const std::string name =
+        formatted("{} [{:x} {:x} {:x} {}]", kernel.name, use.shapes, use.warps, use.opcodes, use.registers);
     std::unique_ptr<Specialised>& slot = made[name];
     if (!slot) {
         slot = std::make_unique<Specialised>();
         slot->name = name;
         slot->constants.assign(kernel.constants.begin(), kernel.constants.end());
-        for (const rhi::SpecConstant c : {rhi::SpecConstant{1, use.shapes}, {2, use.warps}, {3, use.opcodes}, {4, use.registers}}) {
+        for (const rhi::SpecConstant c :
+             {rhi::SpecConstant{1, use.shapes}, {2, use.warps}, {3, use.opcodes}, {4, use.registers}}) {
             slot->constants.push_back(c);
         }
         slot->kernel = {slot->name, kernel.spirv, slot->constants};

@@ -12,8 +12,8 @@ Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surfac
     out.values = g.create("view values", {.size = in.size, .format = rhi::Format::Rgba32Float});
     out.bytes = g.create("view bytes", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
     g.dispatch(kView, in.size,
-               {g.uniform(in.frame), g.read(visibility), g.read(surface.words), g.read(surface.depth), g.write(out.values),
-                g.write(out.bytes)});
+               {g.uniform(in.frame), g.read(visibility), g.read(surface.words), g.read(surface.depth),
+                g.write(out.values), g.write(out.bytes)});
     return out;
 }
 

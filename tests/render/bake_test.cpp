@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MIT
+// The GPU's bake is the CPU's, texel by texel, whichever way the texels take into the atlas.
+#include "field/codes.gpu.h"
+#include "field/host_bricks.h"
+#include "gpu_worlds.h"
+#include "render/gpu_field.h"
+
+#include <cmath>
+
+namespace kiln::render {
+namespace {
+
+struct BakeGpu : GpuTest {};
+
+struct Tally {
+    uint64_t texels = 0, inexact = 0, signs = 0, far = 0, words = 0;
+    double worst = 0;
+};
+
+Tally compare(GpuField& gpu, const field::Field& f) {
+    Tally tally;
+    const bool half = f.options().format == field::DistanceFormat::Half;
+    std::vector<uint32_t> slots;
+    for (uint32_t s = 0; s < f.slot_count(); ++s) {
+        if (f.records()[s].code_count != 0) slots.push_back(s);
+    }
+    const auto read = rhi::must(gpu.read_back(slots));
+    const float h = f.grid().voxel_size;
+    for (size_t i = 0; i < read.size(); ++i) {
+        const field::BrickRecord& r = f.records()[slots[i]];
+        field::BrickTexels expected;
+        field::bake_brick(f, {slots[i], {r.texel_x, r.texel_y, r.texel_z}, r.code_first, r.code_count}, expected);
+        for (size_t t = 0; t < 512; ++t) {
+            const float d = expected.distance[t] / h;
+            const float want = half ? field::stored_half(d) : field::stored_snorm8(d);
+            const float got =
+                half ? field::half_value(read[i].distance_codes[t]) : field::snorm8_value(read[i].distance_codes[t]);
+            const float quantum =
+                half ? std::ldexp(1.0f, std::max(std::ilogb(std::max(std::fabs(want), 1e-4f)) - 10, -14))
+                     : 4.0f / 127.0f;
+            const float off = std::fabs(got - want);
+            ++tally.texels;
+            tally.inexact += off != 0;
+            tally.signs += (got <= 0) != (want <= 0);
+            tally.far += off > std::max(quantum, 0x1p-10f) * 1.001f;
+            tally.worst = std::max(tally.worst, double(off));
+            // Near the band's end either side may call a texel far; weights may round the other way.
+            if (std::fabs(d) > 3.99f) continue;
+            const uint32_t a = read[i].material_words[t], b = expected.material[t];
+            const bool same = a == b || ((a & 255) == (b & 255) && std::abs(int(a >> 8) - int(b >> 8)) <= 1) ||
+                              (a >> 8 <= 1 && b >> 8 <= 1 && (a & 15) == (b & 15));
+            tally.words += !same;
+        }
+        for (size_t k = 0; k < 16; ++k) tally.words += read[i].palette[k] != expected.palette[k] ? 1 : 0;
+    }
+    return tally;
+}
+
+void expect_same(Runner& runner, field::worlds::World world, Baker baker, field::DistanceFormat format) {
+    world.options.format = format;
+    const auto f = world.field();
+    ASSERT_TRUE(f);
+    GpuField gpu(runner);
+    rhi::must(gpu.update(f, baker));
+    const Tally tally = compare(gpu, *f);
+    EXPECT_GT(tally.texels, 2000u);
+    EXPECT_EQ(tally.far, 0u) << world.name << ": of " << tally.texels << ", worst " << tally.worst << " voxels";
+    EXPECT_EQ(tally.words, 0u) << world.name;
+    EXPECT_LE(double(tally.signs), 1e-4 * double(tally.texels)) << world.name;
+}
+
+TEST_F(BakeGpu, TexelsOfTheStorageTextureAreTheCpusOwn) {
+    for (const auto& world : {field::worlds::sphere_of(10), field::worlds::blends(), field::worlds::thin_walls()}) {
+        expect_same(*runner_, world, Baker::Storage, field::DistanceFormat::Half);
+    }
+    expect_same(*runner_, field::worlds::blends(), Baker::Storage, field::DistanceFormat::Snorm8);
+}
+
+TEST_F(BakeGpu, TexelsThatGoThroughABufferAreTheSame) {
+    expect_same(*runner_, field::worlds::blends(), Baker::Copy, field::DistanceFormat::Half);
+    expect_same(*runner_, field::worlds::blends(), Baker::Copy, field::DistanceFormat::Snorm8);
+    expect_same(*runner_, field::worlds::boxes(), Baker::Host, field::DistanceFormat::Half);
+    expect_same(*runner_, field::worlds::boxes(), Baker::Host, field::DistanceFormat::Snorm8);
+}
+
+TEST_F(BakeGpu, MoreThanSixteenMaterialsKeepTheHeaviest) {
+    field::worlds::World world{"many", {}, {.voxel_size = 0.2f, .bounds = {{-1, -1, -1}, {2, 2, 2}}}};
+    for (int i = 0; i < 30; ++i) {
+        const float a = float(i) * 0.7f;
+        world.edits.push_back(field::worlds::of_material(
+            field::worlds::edit(Sphere{.radius = 0.08f + 0.004f * float(i)},
+                                {0.7f + 0.45f * std::cos(a), 0.03f * float(i) + 0.25f, 0.7f + 0.45f * std::sin(a)}),
+            uint32_t(i)));
+    }
+    expect_same(*runner_, world, Baker::Storage, field::DistanceFormat::Half);
+    GpuField gpu(*runner_);
+    rhi::must(gpu.update(world.field(), Baker::Storage));
+    EXPECT_GT(rhi::must(gpu.dropped_materials()), 0u);
+}
+
+TEST_F(BakeGpu, AnEditBakesItsOwnBricksAlone) {
+    field::worlds::World world = field::worlds::blends();
+    const auto before = world.field();
+    GpuField gpu(*runner_);
+    rhi::must(gpu.update(before, Baker::Storage));
+    EXPECT_EQ(gpu.bricks_baked(), before->stats().bricks);
+    world.edits.push_back(field::worlds::edit(Sphere{.radius = 0.1f}, {0.9f, 0.9f, 0.9f}));
+    const auto after = rhi::must(field::Field::update(*before, field::worlds::compiled(world.edits),
+                                                      std::vector<Box3>{{{0.7f, 0.7f, 0.7f}, {1.1f, 1.1f, 1.1f}}}));
+    rhi::must(gpu.update(after, Baker::Storage));
+    EXPECT_LT(gpu.bricks_baked(), before->stats().bricks / 4);
+    EXPECT_GT(gpu.bricks_baked(), 0u);
+    const Tally tally = compare(gpu, *after);
+    EXPECT_EQ(tally.far, 0u);
+    EXPECT_EQ(tally.words, 0u);
+}
+
+}  // namespace
+}  // namespace kiln::render
