@@ -70,11 +70,10 @@ TEST(Exact, RaysEndOnTheSurfaceAndPassNothing) {
             ++hits;
             EXPECT_LE(at(end), 1e-5);
         }
-        for (int k = 1; k < 200; ++k) {
-            if (at(0) > 0)
-                EXPECT_GT(at(end * k / 200), -1e-6)
-                    << "ray " << i << " passed a surface at " << end * k / 200 << " of " << end;
-        }
+        if (at(0) <= 0) continue;
+        for (int k = 1; k < 200; ++k)
+            EXPECT_GT(at(end * k / 200), -1e-6)
+                << "ray " << i << " passed a surface at " << end * k / 200 << " of " << end;
     }
     EXPECT_GT(hits, 100);
 }
