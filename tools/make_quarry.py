@@ -123,6 +123,15 @@ def main():
         s.add("block", shape="box", op="subtract", blend_radius=0.03,
               half_extents=[size * rnd.between(0.7, 1.5), size * rnd.between(0.5, 1.1), size * rnd.between(0.4, 0.9)],
               position=[x, y, z + rnd.between(-0.12, 0.22)], rotation=turn)
+    for _ in range(70):  # the same on the buttress, whose front stands turned
+        across, y, size = rnd.between(-1.5, 1.5), rnd.between(0.3, 7.9), rnd.between(0.14, 0.42)
+        a = math.radians(18)
+        out = 1.6 if abs(across) < 1.2 else rnd.between(0.3, 1.6)
+        x, z = -6.2 + across * math.cos(a) + out * math.sin(a), -1.2 - across * math.sin(a) + out * math.cos(a)
+        turn = product(quaternion([0, 1, 0], 18 + rnd.choose([0, 0, 45]) + rnd.between(-8, 8)), quaternion([1, 0, 0.3], rnd.between(-9, 9)))
+        s.add("chip", shape="box", op="subtract", blend_radius=0.03,
+              half_extents=[size * rnd.between(0.7, 1.6), size * rnd.between(0.4, 1.2), size * rnd.between(0.3, 0.7)],
+              position=[x, y, z], rotation=turn)
     for _ in range(170):  # wedges
         x, y, z = face_point()
         size = rnd.between(0.2, 0.55)
@@ -182,12 +191,12 @@ def main():
         "description": "a cliff worked back in benches by a thousand cuts",
         "field": {"voxel_size": 0.03},
         "materials": {
-            "limestone": {"base_color": [0.50, 0.44, 0.36], "roughness": 0.85},
-            "pale": {"base_color": [0.66, 0.60, 0.50], "roughness": 0.8},
-            "ochre": {"base_color": [0.52, 0.34, 0.16], "roughness": 0.9},
+            "limestone": {"base_color": [0.40, 0.33, 0.25], "roughness": 0.85},
+            "pale": {"base_color": [0.55, 0.47, 0.36], "roughness": 0.8},
+            "ochre": {"base_color": [0.44, 0.25, 0.09], "roughness": 0.9},
             "rust": {"base_color": [0.34, 0.15, 0.08], "roughness": 0.9},
             "slate": {"base_color": [0.20, 0.21, 0.23], "roughness": 0.6},
-            "dust": {"base_color": [0.44, 0.36, 0.27], "roughness": 0.95},
+            "dust": {"base_color": [0.34, 0.26, 0.18], "roughness": 0.95},
             "mud": {"base_color": [0.20, 0.14, 0.09], "roughness": 0.45},
             "water": {"base_color": [0.03, 0.09, 0.10], "roughness": 0.05},
             "grass": {"base_color": [0.13, 0.20, 0.05], "roughness": 0.95},
@@ -200,10 +209,10 @@ def main():
                 {"shape": "cylinder", "half_height": 0.6, "radius": 0.04, "position": [0.4, 0.2, 0.56]}]},
         },
         "edits": s.edits,
-        "lights": [{"type": "directional", "direction": [0.62, -0.72, -0.55], "illuminance": 4.2, "color": [1, 0.9, 0.74], "angular_diameter_deg": 0.8}],
-        "environment": {"color": [0.42, 0.58, 0.85], "intensity": 0.8},
+        "lights": [{"type": "directional", "direction": [0.62, -0.66, -0.52], "illuminance": 4.6, "color": [1, 0.86, 0.66], "angular_diameter_deg": 0.8}],
+        "environment": {"color": [0.30, 0.48, 0.85], "intensity": 0.7},
         "cameras": {
-            "main": {"position": [-9.5, 7.6, 20.5], "target": [-0.6, 3.5, -1.0], "fov_y_deg": 31},
+            "main": {"position": [-8.5, 6.6, 20.5], "target": [0.0, 3.45, -1.0], "fov_y_deg": 29.5},
             "face": {"position": [2.5, 3.0, 8.5], "target": [0.5, 3.6, -2.5], "fov_y_deg": 45},
         },
     }
