@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MIT
+// Gate G21: what C++ and the shaders share has the same offsets on both sides, as read back from the SPIR-V.
+#include "render/passes/passes.h"
+#include "rhi/spirv_reflect.h"
+
+#include <gtest/gtest.h>
+
+#include <cstddef>
+
+namespace kiln::render {
+namespace {
+
+std::vector<uint32_t> offsets(const std::vector<rhi::BlockMember>& members, uint32_t base = 0) {
+    std::vector<uint32_t> out;
+    for (const rhi::BlockMember& m : members) {
+        if (m.members.empty()) {
+            out.push_back(base + m.offset);
+        } else {
+            const std::vector<uint32_t> inner = offsets(m.members, base + m.offset);
+            out.insert(out.end(), inner.begin(), inner.end());
+        }
+    }
+    return out;
+}
+
+rhi::Reflection reflected(const Kernel& kernel) {
+    auto r = rhi::reflect_spirv(kernel.spirv);
+    EXPECT_TRUE(r) << (r ? "" : r.error().message);
+    return r ? *r : rhi::Reflection{};
+}
+
+const rhi::ReflectedBinding* binding(const rhi::Reflection& r, uint32_t number) {
+    for (const rhi::ReflectedBinding& b : r.bindings) {
+        if (b.binding == number) return &b;
+    }
+    return nullptr;
+}
+
+// Offsets of the elements of a storage buffer that holds one runtime array of structs, and its stride.
+void expect_array(const Kernel& kernel, uint32_t number, const std::vector<uint32_t>& expected, uint32_t stride) {
+    const rhi::Reflection r = reflected(kernel);
+    const rhi::ReflectedBinding* b = binding(r, number);
+    ASSERT_TRUE(b) << kernel.name << " binding " << number;
+    ASSERT_EQ(b->members.size(), 1u) << kernel.name << " binding " << number;
+    EXPECT_EQ(b->members[0].array_stride, stride) << kernel.name << " binding " << number;
+    EXPECT_EQ(offsets(b->members[0].members), expected) << kernel.name << " binding " << number;
+}
+
+#define AT(type, member) uint32_t(offsetof(type, member))
+
+TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
+    std::vector<uint32_t> expected;
+    for (uint32_t i = 0; i < 8; ++i) expected.push_back(i * 4);  // GridParams: eight words
+    for (uint32_t i = 0; i < 8; ++i) expected.push_back(AT(FrameParams, eye_x) + i * 4);
+    for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, camera) + i * 16);
+    for (uint32_t i = 0; i < 12; ++i) expected.push_back(AT(FrameParams, width) + i * 4);
+    for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, sky) + i * 16);
+    for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, exposure) + i * 4);
+    EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
+    EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
+    EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, exposure) + 12);
+    for (const Kernel* kernel :
+         {&kMarch, &kMarchExact, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
+        const rhi::Reflection r = reflected(*kernel);
+        const rhi::ReflectedBinding* b = binding(r, 0);
+        ASSERT_TRUE(b) << kernel->name;
+        ASSERT_EQ(b->kind, rhi::BindingKind::UniformBuffer) << kernel->name;
+        EXPECT_EQ(b->block_size, sizeof(FrameParams)) << kernel->name;
+        EXPECT_EQ(offsets(b->members), expected) << kernel->name;
+    }
+}
+
+TEST(Layout, RecordsInBuffersAreTheSame) {
+    std::vector<uint32_t> words;
+    for (uint32_t i = 0; i < 8; ++i) words.push_back(i * 4);
+    EXPECT_EQ(AT(field::BrickRecord, code_count), 16u);
+    expect_array(kBakeHalf, 1, words, sizeof(field::BrickRecord));
+    expect_array(kMarchExact, 2, words, sizeof(field::BrickRecord));
+    EXPECT_EQ(AT(MaterialRecord, metallic), 28u);
+    expect_array(kResolve, 5, words, sizeof(MaterialRecord));
+    std::vector<uint32_t> ray;
+    for (uint32_t i = 0; i < 12; ++i) ray.push_back(i * 4);
+    EXPECT_EQ(AT(FrameRay, part_x), 16u);
+    EXPECT_EQ(AT(FrameRay, direction_x), 32u);
+    expect_array(kMarch, 2, ray, sizeof(FrameRay));
+    const std::vector<uint32_t> light{
+        AT(LightRecord, position),   AT(LightRecord, direction),   AT(LightRecord, color), AT(LightRecord, kind),
+        AT(LightRecord, spot_scale), AT(LightRecord, spot_offset), AT(LightRecord, pad_0)};
+    expect_array(kShadow, 3, light, sizeof(LightRecord));
+    expect_array(kLight, 2, light, sizeof(LightRecord));
+}
+
+TEST(Layout, PushDataIsTheSame) {
+    for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8}) {
+        const rhi::Reflection r = reflected(*kernel);
+        EXPECT_EQ(r.push_bytes, sizeof(BakePush)) << kernel->name;
+        EXPECT_EQ(offsets(r.push_members),
+                  (std::vector<uint32_t>{AT(BakePush, voxel_size), AT(BakePush, voxels_per_metre),
+                                         AT(BakePush, params_first), AT(BakePush, atlas_bricks_x_y)}))
+            << kernel->name;
+    }
+    for (const Kernel* kernel : {&kShadow, &kShadowExact, &kLight}) {
+        EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(ShadowPush)) << kernel->name;
+    }
+}
+
+TEST(Layout, EveryKernelFitsTheFloor) {
+    for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact,
+                                 &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
+        rhi::Caps caps;
+        caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
+        for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))
+            ADD_FAILURE() << kernel->name << ": " << sentence;
+    }
+}
+
+}  // namespace
+}  // namespace kiln::render
