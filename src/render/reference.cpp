@@ -99,7 +99,8 @@ Hit hit_at(const Scene& scene, dvec3 origin, dvec3 direction, double t) {
     const dvec3 n = scene.normal(p);
     hit.n = narrow(n);
     hit.material = scene.field.material(p);
-    hit.p = along(p, n, 1e-6 * std::max({1.0, t, size_of(p)}));
+    // Off the surface by a ten-thousandth of the distance it is seen from: nearer, sphere tracing would crawl away.
+    hit.p = along(p, n, 1e-4 * std::max(0.1, t));
     return hit;
 }
 
@@ -223,7 +224,7 @@ vec3 path(const Scene& scene, dvec3 origin, dvec3 direction, Random& random, boo
         // Dim paths end early, the others make up for them.
         const float alive = std::min(1.0f, largest3(carried));
         if (!(alive > 0)) return sum;
-        if (depth >= 4 && alive < 0.5f) {
+        if (depth >= 2 && alive < 0.5f) {
             if (random.next() >= alive) return sum;
             carried = carried * (1 / alive);
         }
