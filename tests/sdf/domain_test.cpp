@@ -80,6 +80,53 @@ TEST_P(EachWarp, DividedByItsFactorIsOneLipschitzOverEveryShape) {
     EXPECT_LT(refused, name() == "bend" ? tried * 9 / 10 : 1) << "of " << tried;
 }
 
+// The largest stretch of a map at a point: its Jacobian's largest singular value, by power iteration on J^T J.
+double stretch(uint32_t kind, const Params& w, const Point& p, double h) {
+    double j[3][3];
+    for (size_t a = 0; a < 3; ++a) {
+        Point up = p, down = p;
+        up[a] += h;
+        down[a] -= h;
+        const text64::real3 u = text64::point_warp(kind, {up[0], up[1], up[2]}, w.data());
+        const text64::real3 d = text64::point_warp(kind, {down[0], down[1], down[2]}, w.data());
+        j[0][a] = (u.x - d.x) / (2 * h);
+        j[1][a] = (u.y - d.y) / (2 * h);
+        j[2][a] = (u.z - d.z) / (2 * h);
+    }
+    double v[3] = {0.53, 0.62, 0.58}, size = 0;
+    for (int i = 0; i < 60; ++i) {
+        double image[3], back[3];
+        for (int a = 0; a < 3; ++a) image[a] = j[a][0] * v[0] + j[a][1] * v[1] + j[a][2] * v[2];
+        for (int a = 0; a < 3; ++a) back[a] = j[0][a] * image[0] + j[1][a] * image[1] + j[2][a] * image[2];
+        size = std::hypot(back[0], back[1], back[2]);
+        if (size == 0) return 0;
+        for (int a = 0; a < 3; ++a) v[a] = back[a] / size;
+    }
+    return std::sqrt(size);
+}
+
+TEST_P(EachWarp, FactorIsTheLargestStretchOverTheRegion) {
+    if (row().how != KindRow::Point) GTEST_SKIP() << "moves no points";
+    double closest = 0;
+    for_all(name() + ": stretch", [&](Random& random) {
+        const Params w = random.params(row());
+        const float size = float(random.in(0.1, 1));
+        text32::Bounds region{{float(random.in(-1, 1)), float(random.in(-1, 1)), float(random.in(-1, 1))}, {0, 0, 0}};
+        region.hi = region.lo + text32::param3(size, float(random.in(0.1, 1)), float(random.in(0.1, 1)));
+        const double factor = double(text32::warp_lipschitz(kind(), w.data(), region));
+        if (!std::isfinite(factor)) return;
+        const double lo[3] = {region.lo.x, region.lo.y, region.lo.z}, hi[3] = {region.hi.x, region.hi.y, region.hi.z};
+        for (int i = 0; i < 40; ++i) {
+            Point p;  // often a corner: there the extremes are
+            for (size_t a = 0; a < 3; ++a) p[a] = random.one_in(3) ? random.in(lo[a], hi[a]) : random.one_in(2) ? lo[a] : hi[a];
+            const double found = stretch(kind(), w, p, 1e-7);
+            closest = std::max(closest, found / factor);
+            if (found > factor * (1 + 1e-3)) RC_FAIL(show(row(), w) + " stretches " + std::to_string(found) + " > " + std::to_string(factor) + " at " + show(p));
+        }
+    });
+    EXPECT_GT(closest, 0.9) << "the factor is needlessly large";
+}
+
 TEST_P(EachWarp, BoundsHoldTheSolid) {
     if (row().how == KindRow::Copies) GTEST_SKIP() << "tested below";
     int64_t solid = 0;

@@ -18,7 +18,7 @@ KILN_SDF real sd_tetrahedron(real3 p, Tetrahedron s) {
     real a = max(c.x, max(c.y, c.z));
     real b = min(c.x, min(c.y, c.z));
     real m = max(min(c.x, c.y), min(max(c.x, c.y), c.z));
-    // a >= m >= b. Mirror m + b = 0, then order again; two rounds reach the chamber.
+    // a >= m >= b. Mirror m + b = 0, then order again: the last two now sum to at least 0, for a >= m, and -b >= m where it mirrored.
     real fold = min(m + b, 0.0f);
     m = m - fold;
     b = b - fold;
@@ -26,9 +26,6 @@ KILN_SDF real sd_tetrahedron(real3 p, Tetrahedron s) {
     real next = min(a, m);
     real mid = max(next, b);
     real low = min(next, b);
-    fold = min(mid + low, 0.0f);
-    mid = mid - fold;
-    low = low - fold;
     // Face (1, 1, -1): distance k / sqrt(3) from the centre.
     real d = (top + mid - low - k) * KILN_C(0.5773502691896258);
     // Its half edge runs from (k, 0, 0) to (k, k, k), where the face's points have mid = low.
