@@ -8,7 +8,9 @@
 #include <kiln/world.h>
 
 #include <csignal>
+#include <memory>
 #include <new>
+#include <sstream>
 #include <unistd.h>
 
 namespace kiln::cli {
@@ -16,6 +18,17 @@ namespace {
 
 constexpr std::string_view kVerbs[] = {"demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare"};
 constexpr std::string_view kLaterVerbs[] = {"view", "edit", "export", "import", "simulate", "new", "diff", "bench"};
+
+// In the list of verbs only the first line of each description; its own help shows all of it.
+class Help : public CLI::Formatter {
+public:
+    std::string make_subcommand(const CLI::App* verb) const override {
+        std::stringstream out;
+        const std::string description = verb->get_description();
+        CLI::detail::format_help(out, verb->get_name(), description.substr(0, description.find('\n')), 14);
+        return out.str();
+    }
+};
 
 // Only calls that a signal handler may make.
 extern "C" void interrupted(int signal) {
@@ -52,6 +65,7 @@ int run(int argc, char** argv) {
         "  kiln query potter --points points.csv        distances, normals and materials\n"
         "  kiln validate my.kiln.json                   errors with line and column",
         "kiln");
+    app.formatter(std::make_shared<Help>());
     app.set_version_flag("--version", std::string("kiln ") + std::string(version()));
     app.require_subcommand(0, 1);
     Run verb;

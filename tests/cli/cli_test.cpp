@@ -120,7 +120,7 @@ TEST_F(Cli, BadInputIsThreeWithPlaceAndMend) {
         {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": NaN}]}", "finite"},
         {"{\"format\": 1, \"edits\": [{\"shape\": \"spher\"}]}", "did you mean \"sphere\"?"},
         {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": 0}]}",
-         "bad.kiln.json:1:54: edits[0].radius: "},
+         "bad.kiln.json:1:55: edits[0].radius: "},
         {"{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": 1e30}]}", "at most"},
         {"{\"format\": 1, \"objects\": {\"a\": {\"object\": \"a\"}}, \"edits\": [{\"object\": \"a\"}]}",
          "contains itself"},

