@@ -112,7 +112,19 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
     (void)sdf::evaluate(sdf::TapeView{copy, params.data(), program.samples.data()}, p, &mix, true);
     uint32_t rank = mix.id0;
     if (mix.weight >= 0.5f && mix.id1 != uint16_t(sdf::kNoMaterial)) rank = std::max<uint32_t>(mix.id0, mix.id1);
-    return rank < edits.size() ? edits[rank] : UINT32_MAX;
+    if (rank >= edits.size()) return UINT32_MAX;
+    // A hard union keeps the earlier of two equal operands; the question wants the later one.
+    uint32_t found = edits[rank];
+    const double surface = sdf::evaluate(sdf::view(program, code), p);
+    std::vector<sdf::Instruction> alone;
+    for (const uint32_t e : edits) {
+        const sdf::EditSpan& span = program.edits[e];
+        if (e <= found || span.op != Op::Union) continue;
+        alone.assign(1, sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0));
+        alone.insert(alone.end(), program.code.begin() + span.first, program.code.begin() + span.first + span.count);
+        if (std::abs(sdf::evaluate(sdf::view(program, alone), p) - surface) <= 1e-7 * (1 + largest(p))) found = e;
+    }
+    return found;
 }
 
 // Where the ray is inside a box, metres along it; from > to when it misses.
