@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MIT
-// Small pictures against committed ones, by LDR-FLIP. KILN_ACCEPT=1 writes them anew (never where CI is set); look at each before
-// committing it.
+// Small pictures against committed ones, by LDR-FLIP. `./test --accept NAME` writes one anew; look at it before committing it.
+#include "golden.h"
 #include "gpu_worlds.h"
 #include "image/metrics.h"
 
-#include <cstdlib>
 #include <filesystem>
+#include <string>
 
 namespace kiln::render {
 namespace {
@@ -21,16 +21,20 @@ struct GoldenGpu : testing::Test {
         const Picture picture = rhi::must(renderer->render(frame, settings));
         const std::filesystem::path golden =
             std::filesystem::path(KILN_SOURCE_DIR) / "tests/golden/images" / (name + ".png");
-        if (std::getenv("KILN_ACCEPT") != nullptr) {
-            ASSERT_EQ(std::getenv("CI"), nullptr) << "golden pictures are not accepted where nobody looks at them";
-            std::filesystem::create_directories(golden.parent_path());
-            rhi::must(picture.save(golden.string()));
-            return;
-        }
         const std::filesystem::path made = std::filesystem::path(KILN_BINARY_DIR) / ("golden-" + name + ".png");
         rhi::must(picture.save(made.string()));
+        if (golden_accepted(name)) {
+            std::string change = "(none) -> new";
+            if (std::filesystem::exists(golden)) {
+                change = "old -> new: FLIP " + std::to_string(rhi::must(image::compare_files(golden.string(), made.string())).flip);
+            }
+            std::filesystem::create_directories(golden.parent_path());
+            std::filesystem::copy_file(made, golden, std::filesystem::copy_options::overwrite_existing);
+            golden_renewed(name, change);
+            return;
+        }
         const auto apart = rhi::must(image::compare_files(golden.string(), made.string()));
-        EXPECT_LE(apart.flip, 0.005) << golden << " and " << made << "; KILN_ACCEPT=1 renews";
+        EXPECT_LE(apart.flip, 0.005) << golden << " and " << made << "; `./test --accept " << name << "` renews";
     }
     std::unique_ptr<Renderer> renderer;
 };

@@ -3,6 +3,8 @@
 #include "render/graph_hazards.h"
 #include "render/graph_samples.h"
 
+#include "golden.h"
+
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -26,13 +28,15 @@ std::string joined(const std::vector<std::string>& lines) {
 
 void expect_golden(const std::string& name, const std::string& text) {
     const std::string path = std::string(KILN_SOURCE_DIR) + "/tests/golden/plans/" + name;
-    if (std::getenv("KILN_ACCEPT")) std::ofstream(path) << text;
-    std::ifstream file(path);
     std::stringstream golden;
-    golden << file.rdbuf();
+    golden << std::ifstream(path).rdbuf();
+    if (golden_accepted(name)) {
+        std::ofstream(path) << text;
+        return golden_renewed(name, "old -> new:\n" + golden.str() + "->\n" + text);
+    }
     EXPECT_EQ(text, golden.str())
         << "the plan is another one. If it should be, remake it and read the difference:\n"
-        << "  KILN_ACCEPT=1 render_tests --gtest_filter='GraphPlan.*' && git diff tests/golden/plans";
+        << "  ./test --accept " << name << " && git diff tests/golden/plans";
 }
 
 const rhi::TextureHandle kAtlas{1, 1};
