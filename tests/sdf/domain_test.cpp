@@ -72,8 +72,8 @@ TEST_P(EachWarp, DividedByItsFactorIsOneLipschitzOverEveryShape) {
             }
             const double change = std::fabs(warped(row(), kind(), w, bare, p) - warped(row(), kind(), w, bare, q));
             if (change > factor * between(p, q) * (1 + 1e-6) + 2e-6) {
-                RC_FAIL(show(row(), w) + " over " + show(shape_rows()[bare.kind], bare.w) + " " + show(p) + " " + show(q) + ": " +
-                        std::to_string(change / between(p, q)) + " > " + std::to_string(factor));
+                RC_FAIL(show(row(), w) + " over " + show(shape_rows()[bare.kind], bare.w) + " " + show(p) + " " +
+                        show(q) + ": " + std::to_string(change / between(p, q)) + " > " + std::to_string(factor));
             }
         }
     });
@@ -118,10 +118,13 @@ TEST_P(EachWarp, FactorIsTheLargestStretchOverTheRegion) {
         const double lo[3] = {region.lo.x, region.lo.y, region.lo.z}, hi[3] = {region.hi.x, region.hi.y, region.hi.z};
         for (int i = 0; i < 40; ++i) {
             Point p;  // often a corner: there the extremes are
-            for (size_t a = 0; a < 3; ++a) p[a] = random.one_in(3) ? random.in(lo[a], hi[a]) : random.one_in(2) ? lo[a] : hi[a];
+            for (size_t a = 0; a < 3; ++a)
+                p[a] = random.one_in(3) ? random.in(lo[a], hi[a]) : random.one_in(2) ? lo[a] : hi[a];
             const double found = stretch(kind(), w, p, 1e-7);
             closest = std::max(closest, found / factor);
-            if (found > factor * (1 + 1e-3)) RC_FAIL(show(row(), w) + " stretches " + std::to_string(found) + " > " + std::to_string(factor) + " at " + show(p));
+            if (found > factor * (1 + 1e-3))
+                RC_FAIL(show(row(), w) + " stretches " + std::to_string(found) + " > " + std::to_string(factor) +
+                        " at " + show(p));
         }
     });
     EXPECT_GT(closest, 0.9) << "the factor is needlessly large";
@@ -132,7 +135,8 @@ TEST_P(EachWarp, BoundsHoldTheSolid) {
     int64_t solid = 0;
     for_all(name() + ": bounds", [&](Random& random) {
         const Bare bare(random);
-        if (shape_rows()[bare.kind].how != KindRow::Exact) return;  // a lower bound may grow by more than round's radius
+        if (shape_rows()[bare.kind].how != KindRow::Exact)
+            return;  // a lower bound may grow by more than round's radius
         const Params w = random.params(row());
         const text32::Bounds b = text32::warp_bounds(kind(), w.data(), bare.bounds);
         const Around around(b);
@@ -143,7 +147,8 @@ TEST_P(EachWarp, BoundsHoldTheSolid) {
             const double slack = 1e-5 * (1 + around.size);
             if (p[0] < double(b.lo.x) - slack || p[0] > double(b.hi.x) + slack || p[1] < double(b.lo.y) - slack ||
                 p[1] > double(b.hi.y) + slack || p[2] < double(b.lo.z) - slack || p[2] > double(b.hi.z) + slack) {
-                RC_FAIL(show(row(), w) + " over " + show(shape_rows()[bare.kind], bare.w) + " is solid outside at " + show(p));
+                RC_FAIL(show(row(), w) + " over " + show(shape_rows()[bare.kind], bare.w) + " is solid outside at " +
+                        show(p));
             }
         }
     });
@@ -154,7 +159,8 @@ TEST_P(EachWarp, FloatAgreesWithDouble) {
     if (row().how == KindRow::Copies) GTEST_SKIP() << "tested below";
     for_all(name() + ": float = double", [&](Random& random) {
         const Params w = random.params(row());
-        const Point p{double(float(random.in(-3, 3))), double(float(random.in(-3, 3))), double(float(random.in(-3, 3)))};
+        const Point p{double(float(random.in(-3, 3))), double(float(random.in(-3, 3))),
+                      double(float(random.in(-3, 3)))};
         const text64::real3 p64(p[0], p[1], p[2]);
         const text32::real3 p32{float(p[0]), float(p[1]), float(p[2])};
         if (row().how == KindRow::Point) {
@@ -162,8 +168,11 @@ TEST_P(EachWarp, FloatAgreesWithDouble) {
             const text32::real3 b = text32::point_warp(kind(), p32, w.data());
             // Near its centre a bend's angle is as uncertain as the point; compare where the map stretches by less than 10.
             const double k = name() == "bend" ? double(w[0]) : 0;
-            if (name() == "bend" && (std::hypot(k * p[0], 1 - k * p[1]) < 0.1 || std::fabs(std::atan2(k * p[0], 1 - k * p[1])) > 3.14)) return;
-            RC_ASSERT(between({a.x, a.y, a.z}, {double(b.x), double(b.y), double(b.z)}) < 3e-5 * std::max(1.0, length(a)));
+            if (name() == "bend" &&
+                (std::hypot(k * p[0], 1 - k * p[1]) < 0.1 || std::fabs(std::atan2(k * p[0], 1 - k * p[1])) > 3.14))
+                return;
+            RC_ASSERT(between({a.x, a.y, a.z}, {double(b.x), double(b.y), double(b.z)}) <
+                      3e-5 * std::max(1.0, length(a)));
         } else {
             const double d = double(float(random.in(-1, 1)));
             const double a = text64::value_warp(kind(), d, p64, w.data());
@@ -239,7 +248,8 @@ TEST(Elongate, PullsTheHalvesApart) {
         },
         1);
     const float w[kMaxParams] = {0.5f, 0, 0};
-    EXPECT_EQ(text32::point_warp(*warp_kind("elongate"), {0.4f, 1, 2}, w).x, 0.0f) << "the gap is filled with what was at 0";
+    EXPECT_EQ(text32::point_warp(*warp_kind("elongate"), {0.4f, 1, 2}, w).x, 0.0f)
+        << "the gap is filled with what was at 0";
 }
 
 TEST(Mirror, KeepsThePlusHalfOfItsAxis) {
@@ -275,7 +285,8 @@ TEST(Repeat, TwoCopiesAnAxisFindTheNearestOfAll) {
             const double v = -std::sin(angle) * (x - at[0]) + std::cos(angle) * (y - at[1]);
             return std::hypot(u - std::clamp(u, -half, half), v, z - at[2]) - radius;
         };
-        const double size[3] = {half * std::fabs(std::cos(angle)) + radius, half * std::fabs(std::sin(angle)) + radius, radius};
+        const double size[3] = {half * std::fabs(std::cos(angle)) + radius, half * std::fabs(std::sin(angle)) + radius,
+                                radius};
         Params w{};
         for (size_t a = 0; a < 3; ++a) {
             w[a] = random.one_in(4) ? 0.0f : float(2 * size[a] * random.in(1.0001, 2));
@@ -400,7 +411,8 @@ double steepest_over(const Cell& cell, int& widest) {
         u[a] = {fade(lo), fade(hi)};  // both rise on [0, 1/2]
         d[a] = {fade_slope(lo), fade_slope(hi)};
         const double peak = 0.5 - std::sqrt(3.0) / 6;
-        dd[a] = {std::min(fade_bend(lo), fade_bend(hi)), lo <= peak && peak <= hi ? fade_bend(peak) : std::max(fade_bend(lo), fade_bend(hi))};
+        dd[a] = {std::min(fade_bend(lo), fade_bend(hi)),
+                 lo <= peak && peak <= hi ? fade_bend(peak) : std::max(fade_bend(lo), fade_bend(hi))};
     }
     for (int c = 0; c < 8; ++c) {
         Interval w[3], s[3], b[3], o[3];
@@ -471,7 +483,9 @@ TEST(Displace, TheProofIsAboutThisNoise) {
             Point up = p, down = p;
             up[a] += h;
             down[a] -= h;
-            g[a] = (text64::gradient_noise({up[0], up[1], up[2]}, 7) - text64::gradient_noise({down[0], down[1], down[2]}, 7)) / (2 * h);
+            g[a] = (text64::gradient_noise({up[0], up[1], up[2]}, 7) -
+                    text64::gradient_noise({down[0], down[1], down[2]}, 7)) /
+                   (2 * h);
         }
         const double length = std::hypot(g[0], g[1], g[2]);
         const double e[3] = {g[0] / length, g[1] / length, g[2] / length};

@@ -59,9 +59,11 @@ TEST_P(EachComposite, IsOneLipschitzInsideItsBoundsForAnyParameters) {
             const Point q = beside(random, p, size * std::pow(10.0, random.in(-4, 0)));
             const double f = evaluate(view(*program), dvec3{p[0], p[1], p[2]});
             const double g = evaluate(view(*program), dvec3{q[0], q[1], q[2]});
-            if (std::fabs(f - g) > between(p, q) * (1 + 1e-5) + 3e-6 * size) RC_FAIL(show(row(), w) + " " + show(p) + " " + show(q));
+            if (std::fabs(f - g) > between(p, q) * (1 + 1e-5) + 3e-6 * size)
+                RC_FAIL(show(row(), w) + " " + show(p) + " " + show(q));
             const Box3 wide = box.inflated(float(1e-5 * size));
-            if (f <= 0 && !wide.contains({float(p[0]), float(p[1]), float(p[2])})) RC_FAIL(show(row(), w) + " solid outside at " + show(p));
+            if (f <= 0 && !wide.contains({float(p[0]), float(p[1]), float(p[2])}))
+                RC_FAIL(show(row(), w) + " solid outside at " + show(p));
         }
     });
 }
@@ -134,7 +136,9 @@ TEST(Planet, StaysWithinItsReliefAndChangesWithTheSeed) {
         Random random(3);
         for (int i = 0; i < 2000; ++i) {
             vec3 n = normalize({float(random.in(-1, 1)), float(random.in(-1, 1)), float(random.in(-1, 1))});
-            const auto at = [&](float r) { return evaluate(view(*program), dvec3{double(n.x * r), double(n.y * r), double(n.z * r)}); };
+            const auto at = [&](float r) {
+                return evaluate(view(*program), dvec3{double(n.x * r), double(n.y * r), double(n.z * r)});
+            };
             EXPECT_GT(at(2.2f + 1e-4f), 0);
             EXPECT_LT(at(1.8f - 1e-4f), 0);
             if (i == 0) different += at(2) * double(seed + 1);

@@ -16,9 +16,12 @@ double closed_smin(double a, double b, double k) {
 
 double closed(Op op, double a, double b, double k) {
     switch (op) {
-        case Op::Union: return closed_smin(a, b, k);
-        case Op::Subtract: return -closed_smin(-a, b, k);
-        default: return -closed_smin(-a, -b, k);
+    case Op::Union:
+        return closed_smin(a, b, k);
+    case Op::Subtract:
+        return -closed_smin(-a, b, k);
+    default:
+        return -closed_smin(-a, -b, k);
     }
 }
 
@@ -27,7 +30,9 @@ constexpr Op kOps[] = {Op::Union, Op::Subtract, Op::Intersect};
 struct Operands {
     double a, b, k;
     explicit Operands(Random& random)
-        : a(random.in(-2, 2)), b(random.one_in(4) ? a : random.in(-2, 2)), k(random.one_in(4) ? 0 : random.in(0.01, 3)) {}
+        : a(random.in(-2, 2)),
+          b(random.one_in(4) ? a : random.in(-2, 2)),
+          k(random.one_in(4) ? 0 : random.in(0.01, 3)) {}
 };
 
 TEST(Ops, AreTheClosedForm) {

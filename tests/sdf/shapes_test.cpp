@@ -85,11 +85,13 @@ bool inside(std::string_view name, const Params& f, const Point& p) {
     if (name == "box") return ax <= w[0] && ay <= w[1] && az <= w[2];
     if (name == "rounded_box") {
         const double round = std::min({w[3], w[0], w[1], w[2]});
-        return std::hypot(std::max(ax - w[0] + round, 0.0), std::max(ay - w[1] + round, 0.0), std::max(az - w[2] + round, 0.0)) <= round;
+        return std::hypot(std::max(ax - w[0] + round, 0.0), std::max(ay - w[1] + round, 0.0),
+                          std::max(az - w[2] + round, 0.0)) <= round;
     }
     if (name == "box_frame") {
         const auto rim = [&](double a, double h) { return a >= h - std::min(w[3], h); };
-        return ax <= w[0] && ay <= w[1] && az <= w[2] && int(rim(ax, w[0])) + int(rim(ay, w[1])) + int(rim(az, w[2])) >= 2;
+        return ax <= w[0] && ay <= w[1] && az <= w[2] &&
+               int(rim(ax, w[0])) + int(rim(ay, w[1])) + int(rim(az, w[2])) >= 2;
     }
     if (name == "torus") return square(r - w[0]) + y * y <= w[1] * w[1];
     if (name == "capped_torus") {
@@ -142,7 +144,8 @@ TEST_P(EachShape, SignAgreesWithAnIndependentDefinition) {
             const double d = distance64(kind(), w, p);
             // Parameters that touch (a full solid angle, a cut at the very top) leave surfaces without thickness.
             if (std::fabs(d) < 1e-6 * std::max(around.size, magnitude(p)) + 1e-9) continue;
-            if ((d < 0) != inside(row().name, w, p)) RC_FAIL(show(row(), w) + " at " + show(p) + " says " + std::to_string(d));
+            if ((d < 0) != inside(row().name, w, p))
+                RC_FAIL(show(row(), w) + " at " + show(p) + " says " + std::to_string(d));
         }
     });
 }
@@ -153,7 +156,8 @@ TEST_P(EachShape, IsOneLipschitz) {
         const Around around(text32::shape_bounds(kind(), w.data()));
         for (int i = 0; i < 100; ++i) {
             const Point p = around.point(random);
-            const Point q = i % 4 == 3 ? around.point(random) : beside(random, p, around.size * std::pow(10.0, random.in(-5, 0.5)));
+            const Point q =
+                i % 4 == 3 ? around.point(random) : beside(random, p, around.size * std::pow(10.0, random.in(-5, 0.5)));
             const double far = between(p, q);
             const double scale = std::max({around.size, magnitude(p), magnitude(q)});
             // The ellipsoid's iteration stops within 1e-6 of its size.
@@ -185,7 +189,8 @@ TEST_P(EachShape, FloatAgreesWithDouble) {
 TEST_P(EachShape, IsFiniteAtDegenerateAndFarPoints) {
     for_all(name() + ": finite", [&](Random& random) {
         const Params w = random.params(row());
-        const double special[] = {0.0, -0.0, 1e-38, 1e-30, -1e-20, 1e6, -1e6, double(w[0]), -double(w[0]), double(w[1]), double(w[2])};
+        const double special[] = {0.0,  -0.0,         1e-38,         1e-30,        -1e-20,      1e6,
+                                  -1e6, double(w[0]), -double(w[0]), double(w[1]), double(w[2])};
         for (int i = 0; i < 100; ++i) {
             Point p;
             for (double& c : p) c = special[random.below(int(std::size(special)))];
@@ -225,7 +230,8 @@ TEST_P(EachShape, ExactOnesAreExactOutside) {
             }
             const Point foot{p[0] - d * g[0] / length, p[1] - d * g[1] / length, p[2] - d * g[2] / length};
             const double left = distance64(kind(), w, foot);
-            if (std::fabs(left) > 1e-4 * scale) RC_FAIL(show(row(), w) + " at " + show(p) + " misses the surface by " + std::to_string(left));
+            if (std::fabs(left) > 1e-4 * scale)
+                RC_FAIL(show(row(), w) + " at " + show(p) + " misses the surface by " + std::to_string(left));
         }
     });
     EXPECT_GT(tried, 1000);
@@ -247,8 +253,10 @@ TEST_P(EachShape, BoundsAreTheTightestBox) {
                 Point far{};
                 far[axis] = face + sign * 1e5 * around.size;
                 const double d = distance64(kind(), w, far);
-                const double slack = (d - 1e5 * around.size) / around.size;  // positive: the solid stays away from the face
-                if (std::fabs(slack) > 2e-5 && !of_box) RC_FAIL(show(row(), w) + " axis " + std::to_string(axis) + " off by " + std::to_string(slack));
+                const double slack =
+                    (d - 1e5 * around.size) / around.size;  // positive: the solid stays away from the face
+                if (std::fabs(slack) > 2e-5 && !of_box)
+                    RC_FAIL(show(row(), w) + " axis " + std::to_string(axis) + " off by " + std::to_string(slack));
             }
         }
         for (int i = 0; i < 100; ++i) {
@@ -256,7 +264,8 @@ TEST_P(EachShape, BoundsAreTheTightestBox) {
             if (distance64(kind(), w, p) > 0) continue;
             for (size_t a = 0; a < 3; ++a) {
                 const double slack = 1e-6 * around.size;
-                if (p[a] < lo[a] - slack || p[a] > hi[a] + slack) RC_FAIL(show(row(), w) + " is solid outside its bounds at " + show(p));
+                if (p[a] < lo[a] - slack || p[a] > hi[a] + slack)
+                    RC_FAIL(show(row(), w) + " is solid outside its bounds at " + show(p));
             }
         }
     });
@@ -290,7 +299,8 @@ TEST_P(EachShape, EveryInstructionSetGivesTheSameBytes) {
             evaluate(view(*program), points, other.data(), isa);
             for (int i = 0; i < kCount; ++i) {
                 if (std::memcmp(&reference[size_t(i)], &other[size_t(i)], 4) != 0) {
-                    RC_FAIL(show(row(), edit.node.shape.params) + " with instruction set " + std::to_string(int(isa)) + " at point " +
+                    RC_FAIL(show(row(), edit.node.shape.params) + " with instruction set " + std::to_string(int(isa)) +
+                            " at point " +
                             show(Point{double(x[size_t(i)]), double(y[size_t(i)]), double(z[size_t(i)])}));
                 }
             }
@@ -321,7 +331,9 @@ TEST(Ellipsoid, IsOneLipschitzAndConvergedForAnyProportions) {
             for (size_t a = 0; a < 3; ++a) p[a] = r[a] * r[a] * n[a] / support + out * n[a] / norm;
             const double d = distance64(kind, w, p);
             if (d > out + 1e-12 * size) RC_FAIL(show(shape_rows()[kind], w) + " claims too much at " + show(p));
-            if (d < out - 1e-6 * size) RC_FAIL(show(shape_rows()[kind], w) + " is " + std::to_string(d / out) + " of the distance at " + show(p));
+            if (d < out - 1e-6 * size)
+                RC_FAIL(show(shape_rows()[kind], w) + " is " + std::to_string(d / out) + " of the distance at " +
+                        show(p));
             const Point q = beside(random, p, out * std::pow(10.0, random.in(-6, 0)));
             if (std::fabs(distance64(kind, w, p) - distance64(kind, w, q)) > between(p, q) * (1 + 1e-6) + 1e-6 * size) {
                 RC_FAIL(show(shape_rows()[kind], w) + " " + show(p) + " " + show(q));

@@ -59,8 +59,9 @@ using Point = std::array<double, 3>;
 
 inline constexpr int kGridSide = 5;
 /// Numbers that every heightfield of these tests reads.
-inline constexpr float kGrid[kGridSide * kGridSide] = {0.0f, 0.3f, 0.5f, 1.0f, 0.2f, 0.2f, 0.7f, 0.1f, 0.4f, 0.9f, 0.9f, 0.3f, 0.2f,
-                                                       0.6f, 0.1f, 0.1f, 0.0f, 1.0f, 0.5f, 0.4f, 0.8f, 0.1f, 0.3f, 0.6f, 0.7f};
+inline constexpr float kGrid[kGridSide * kGridSide] = {0.0f, 0.3f, 0.5f, 1.0f, 0.2f, 0.2f, 0.7f, 0.1f, 0.4f,
+                                                       0.9f, 0.9f, 0.3f, 0.2f, 0.6f, 0.1f, 0.1f, 0.0f, 1.0f,
+                                                       0.5f, 0.4f, 0.8f, 0.1f, 0.3f, 0.6f, 0.7f};
 /// Their largest differences between neighbours.
 inline constexpr float kGridStepX = 1.0f;
 inline constexpr float kGridStepZ = 0.8f;
@@ -157,7 +158,8 @@ struct Around {
     Point point(Random& random) const {
         const double out = random.one_in(4) ? size * random.in(1, 20) : 0.3 * size;
         Point p;
-        for (size_t i = 0; i < 3; ++i) p[i] = random.one_in(20) ? 0.0 : double(float(random.in(lo[i] - out, hi[i] + out)));
+        for (size_t i = 0; i < 3; ++i)
+            p[i] = random.one_in(20) ? 0.0 : double(float(random.in(lo[i] - out, hi[i] + out)));
         return p;
     }
 };

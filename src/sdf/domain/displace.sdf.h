@@ -46,7 +46,8 @@ KILN_SDF real gradient_noise(real3 p, param seed) {
     real3 cell = floor(p);
     real3 t = p - cell;
     // Beyond 1e9 cells no float has a fraction; the clamp keeps the integers in range.
-    real3 at = clamp(cell, real3(KILN_C(-1e9), KILN_C(-1e9), KILN_C(-1e9)), real3(KILN_C(1e9), KILN_C(1e9), KILN_C(1e9)));
+    real3 at =
+        clamp(cell, real3(KILN_C(-1e9), KILN_C(-1e9), KILN_C(-1e9)), real3(KILN_C(1e9), KILN_C(1e9), KILN_C(1e9)));
     whole i = whole_of(at.x);
     whole j = whole_of(at.y);
     whole k = whole_of(at.z) + whole_of(real(seed));
@@ -64,10 +65,14 @@ KILN_SDF real gradient_noise(real3 p, param seed) {
     return (near + (far - near) * w) * KILN_C(0.6666666666666666);
 }
 
-KILN_SDF real value_displace(real d, real3 p, Displace s) { return d - s.amplitude * gradient_noise(p * s.frequency, s.seed); }
+KILN_SDF real value_displace(real d, real3 p, Displace s) {
+    return d - s.amplitude * gradient_noise(p * s.frequency, s.seed);
+}
 
 #ifdef KILN_HOST
 constexpr param kDisplaceSteepest = KILN_C(3.5);
 KILN_SDF Bounds bounds_displace(Displace s, Bounds child) { return inflated(child, abs(s.amplitude)); }
-KILN_SDF param lipschitz_displace(Displace s, Bounds) { return 1.0f + abs(s.amplitude) * s.frequency * kDisplaceSteepest; }
+KILN_SDF param lipschitz_displace(Displace s, Bounds) {
+    return 1.0f + abs(s.amplitude) * s.frequency * kDisplaceSteepest;
+}
 #endif

@@ -40,7 +40,8 @@ inline Object planet_object(const PlanetRecord& s) {
         const float depth = 0.5f * relief;
         const float ball = (mouth * mouth + depth * depth) / (2 * depth);
         const float from = 1 - depth + ball;
-        tree.leaf(0, Sphere{.radius = ball}, at({from * ring * std::cos(longitude), from * y, from * ring * std::sin(longitude)}));
+        tree.leaf(0, Sphere{.radius = ball},
+                  at({from * ring * std::cos(longitude), from * y, from * ring * std::sin(longitude)}));
     }
     return tree.take();
 }

@@ -27,10 +27,12 @@ inline Object spaceship_object(const SpaceshipRecord& s) {
     const uint32_t engine = tree.fold(0, Op::Subtract, 0.01f, {}, {Mirror{.axis = 0}});
     const uint32_t nacelle = tree.fold(engine, Op::Union, 0.02f);
     tree.leaf(nacelle, Capsule{.half_height = 0.1f, .radius = 0.05f}, at({0.15f, -0.27f, 0}));
-    tree.leaf(nacelle, Cone{.half_height = 0.06f, .radius_bottom = 0.055f, .radius_top = 0.038f}, at({0.15f, -0.44f, 0}));
+    tree.leaf(nacelle, Cone{.half_height = 0.06f, .radius_bottom = 0.055f, .radius_top = 0.038f},
+              at({0.15f, -0.44f, 0}));
     tree.leaf(engine, Cone{.half_height = 0.06f, .radius_bottom = 0.046f, .radius_top = 0.02f}, at({0.15f, -0.46f, 0}));
     // Guns under the wings.
-    tree.pair(0, RoundedCylinder{.half_height = 0.09f, .radius = 0.012f, .rounding = 0.006f}, at({0.29f, -0.12f, -0.02f}));
+    tree.pair(0, RoundedCylinder{.half_height = 0.09f, .radius = 0.012f, .rounding = 0.006f},
+              at({0.29f, -0.12f, -0.02f}));
     return tree.take();
 }
 

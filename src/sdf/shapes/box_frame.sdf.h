@@ -5,10 +5,10 @@
 
 struct BoxFrame {
     param3 half_extents;  // = (0.5, 0.5, 0.5) m, > 0: centre to each outer face
-    param thickness;      // = 0.1 m, > 0: width of the beams, along each axis at most the half extent
+    param thickness;  // = 0.1 m, > 0: width of the beams, from the half extent on nothing is left open along that axis
 };
 
-// Box from -far to 0 along x and from -2 e to 0 along y and z, where q = p + e on those two.
+// A beam: up to 0 along its own axis, within its half width across.
 KILN_SDF real box_frame_beam(real along, real across, real other, param across_half, param other_half) {
     real3 q = real3(along, abs(across) - across_half, abs(other) - other_half);
     return length(max(q, real3(0.0f, 0.0f, 0.0f))) + min(max(q.x, max(q.y, q.z)), 0.0f);
@@ -16,7 +16,8 @@ KILN_SDF real box_frame_beam(real along, real across, real other, param across_h
 
 KILN_SDF real sd_box_frame(real3 p, BoxFrame s) {
     real3 q = abs(p) - s.half_extents;
-    param3 e = min(param3(s.thickness, s.thickness, s.thickness), s.half_extents) * 0.5f;
+    // Half the beams' width; from the half extent on a beam fills its side and meets its mirror image.
+    param3 e = min(param3(s.thickness, s.thickness, s.thickness) * 0.5f, s.half_extents);
     real3 o = q + e;
     return min(box_frame_beam(q.x, o.y, o.z, e.y, e.z),
                min(box_frame_beam(q.y, o.x, o.z, e.x, e.z), box_frame_beam(q.z, o.x, o.y, e.x, e.y)));

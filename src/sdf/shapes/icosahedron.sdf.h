@@ -12,7 +12,8 @@ KILN_SDF real sd_icosahedron(real3 p, Icosahedron s) {
                     p.x * KILN_C(0.5257311121191336) + p.y * KILN_C(0.8506508083520399));
     // Chamber: between x = 0, y = 0 and the plane through a vertex and a face's centre, of normal (g, 1, -1/g) / 2.
     for (int i = 0; i < 5; ++i) {
-        real beyond = max(abs(q.x) * KILN_C(0.8090169943749475) + abs(q.y) * 0.5f - abs(q.z) * KILN_C(0.3090169943749474), 0.0f);
+        real beyond =
+            max(abs(q.x) * KILN_C(0.8090169943749475) + abs(q.y) * 0.5f - abs(q.z) * KILN_C(0.3090169943749474), 0.0f);
         q = real3(abs(q.x) - beyond * KILN_C(1.618033988749895), abs(q.y) - beyond,
                   abs(q.z) + beyond * KILN_C(0.6180339887498949));
     }

@@ -15,5 +15,7 @@ KILN_SDF real sd_rounded_box(real3 p, RoundedBox s) {
 }
 
 #ifdef KILN_HOST
-KILN_SDF Bounds bounds_rounded_box(RoundedBox s) { return symmetric(s.half_extents.x, s.half_extents.y, s.half_extents.z); }
+KILN_SDF Bounds bounds_rounded_box(RoundedBox s) {
+    return symmetric(s.half_extents.x, s.half_extents.y, s.half_extents.z);
+}
 #endif
