@@ -115,7 +115,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.push_back(&kView);
         return out;
     }
-    out.push_back(in.exact ? &specialised(kShadowExact, in.use) : &kShadow);
+    out.push_back(&shadow_kernel(in));
     out.push_back(&kLight);
     out.push_back(&kTonemap);
     return out;

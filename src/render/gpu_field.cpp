@@ -170,7 +170,6 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
 std::vector<sdf::Instruction> GpuField::outside_code() {
     const sdf::Program& program = field_->program();
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
-    int edits = 0;
     bool adds = false;
     bool concave = true;
     for (const sdf::EditSpan& edit : program.edits) {
@@ -178,9 +177,8 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
         adds = adds || edit.op == Op::Union;
         const auto code = std::span(program.code).subspan(edit.first, edit.count);
         out.insert(out.end(), code.begin(), code.end());
-        if (edit.op == Op::Paint) continue;  // changes no distance
-        ++edits;
-        concave = concave && edit.op == Op::Union && (edits == 1 || edit.reach == 0);
+        if (edit.op == Op::Paint) continue;         // changes no distance
+        concave = concave && edit.op == Op::Union;  // the smooth minimum of concave functions is concave
         for (const sdf::Instruction in : code) {
             if (in.opcode() == sdf::Opcode::Shape) concave = concave && in.aux() == uint32_t(ShapeKind::Plane);
             const bool keeps_straight = in.opcode() <= sdf::Opcode::PointAffineOn ||

@@ -43,7 +43,7 @@ public:
     field::GridParams grid() const;  // with the atlas layout filled in
     float distance_scale() const;    // voxels a unit of the atlas
     bool leaves_grid() const { return outside_count_ != 0; }
-    // Nothing but half-spaces, in hard unions, leaves the grid: along any ray the field there is a concave function.
+    // Nothing but half-spaces, in unions, leaves the grid: along any ray the field there is a concave function.
     bool outside_is_concave() const { return outside_is_concave_; }
     // What can occur on the tapes; everything, on GPUs. `outside`: on the tape of what leaves the grid alone.
     const TapeUse& use(bool outside) const { return outside ? outside_use_ : use_; }

@@ -54,6 +54,7 @@ struct Renderer::Impl {
         TileInputs in;
         in.analytic = settings.analytic;
         in.exact = settings.analytic || field->leaves_grid();
+        in.horizons = !settings.analytic && field->outside_is_concave();
         in.use = field->use(!settings.analytic);
         return in;
     }

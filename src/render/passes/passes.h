@@ -14,7 +14,7 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kLight, kTonemap, kView;
+extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons, kLight, kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
@@ -41,6 +41,7 @@ struct TileInputs {
     rhi::Extent size;       // of the tile
     bool exact = false;     // some code is marched: analytic, or edits leave the grid
     bool analytic = false;  // … instead of the bricks
+    bool horizons = false;   // exact code is half-spaces outside the grid, no more
     TapeUse use;
 };
 
@@ -57,6 +58,7 @@ struct Surface {
 };
 Surface resolve(Graph& g, const TileInputs& in, const Image& visibility);
 
+const Kernel& shadow_kernel(const TileInputs& in);
 // Visible fractions of the discs of lights push.first_light … + 3, a channel each.
 Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);
 // Scene-linear radiance, before exposure.

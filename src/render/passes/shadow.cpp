@@ -9,13 +9,24 @@ namespace kiln::render {
 const Kernel kShadow{"shadow", kShadowSpv};
 const Kernel kShadowExact{"shadow exact", kShadowExactSpv};
 
+namespace {
+constexpr rhi::SpecConstant kBricksAlone[] = {{5, 0}};
+}  // namespace
+
+const Kernel kShadowHorizons{"shadow horizons", kShadowExactSpv, kBricksAlone};
+
+const Kernel& shadow_kernel(const TileInputs& in) {
+    if (!in.exact) return kShadow;
+    return specialised(in.horizons ? kShadowHorizons : kShadowExact, in.use);
+}
+
 Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push) {
     Image fractions = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
     const FieldHandles& f = in.field;
     std::vector<Use> uses{g.uniform(in.frame),    g.read(f.cells),    g.read(in.rays),       g.read(in.lights),
                           g.sampled(f.distances), g.read(visibility), g.read(surface.words), g.write(fractions)};
     if (in.exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
-    g.dispatch(in.exact ? specialised(kShadowExact, in.use) : kShadow, in.size, uses, push);
+    g.dispatch(shadow_kernel(in), in.size, uses, push);
     return fractions;
 }
 

@@ -22,6 +22,8 @@ layout(set = 0, binding = 11, std430) readonly buffer ProgramCode { uvec2 progra
 layout(set = 0, binding = 12, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 layout(push_constant) uniform Push { ShadowPush push; };
+// False: code is only asked for horizons, no ray marches along it.
+layout(constant_id = 5) const bool kAlongCode = true;
 
 #include "render/passes/map.glsl"
 #include "render/passes/rays.glsl"
@@ -65,6 +67,7 @@ vec2 shadow_field(vec3 p) {
     bool occupied = (word & kCellOccupied) != 0u;
     int slot = int(word & kCellSlotMask);
 #ifdef KILN_EXACT
+    if (kAlongCode) {
     bool unpruned = (frame.flags & kFrameUnpruned) != 0u;
     uint state = unpruned ? kSeenProgram : (inside_grid ? kSeenPruned : kSeenOutside);
     bool march_outside = frame.outside_count != 0u && (frame.flags & kFrameOutsideConcave) == 0u;
@@ -75,6 +78,7 @@ vec2 shadow_field(vec3 p) {
         // Outside the grid the code says nothing of what is inside.
         float step = state == kSeenOutside ? min(abs(d), grid_gap(local) + 0.25) : abs(d);
         return vec2(d, max(step, 1e-3));
+    }
     }
 #endif
     if (!inside_grid) return vec2(kFarAway, grid_gap(local) + 0.25);
@@ -103,7 +107,7 @@ float above_horizons(vec3 p, vec3 l, float tan_radius, float distance_voxels) {
 #endif
 
 // Wide discs are cut into parts, so that each part's cone stays in the band that bricks store.
-int disc_parts(float tan_radius) { return tan_radius < 0.04 ? 1 : (tan_radius < 0.2 ? 4 : 9); }
+int disc_parts(float tan_radius) { return tan_radius < 0.25 ? 1 : 4; }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
