@@ -85,6 +85,8 @@ struct Runner::Impl {
     };
     Result<Prepared> prepare(const GraphPass& pass, uint64_t block_base);
     void record(rhi::CommandEncoder& encoder, const GraphPass& pass, const Prepared& prepared);
+    void between_regions(rhi::CommandEncoder& encoder, uint32_t dst, const CopyRegion& region,
+                         std::vector<bool>& written);
     void emit(rhi::CommandEncoder& encoder, const std::vector<PlanBarrier>& list);
     Result<rhi::SubmitId> submit(const Graph& graph, Slot& slot);
     void remember();
@@ -391,6 +393,27 @@ Result<Runner::Impl::Prepared> Runner::Impl::prepare(const GraphPass& pass, uint
     return out;
 }
 
+// Every region is a write of its own to the same mip and layer: a later one waits for the earlier ones.
+void Runner::Impl::between_regions(rhi::CommandEncoder& encoder, uint32_t dst, const CopyRegion& region,
+                                   std::vector<bool>& written) {
+    const GraphResource& r = plan.resources[dst];
+    const bool array = r.is_image && r.dimension == rhi::Dimension::D2Array;
+    const uint32_t first = array ? region.origin.z : 0, count = array ? region.size.depth : 1;
+    const uint32_t level = r.is_image ? region.mip : 0;
+    std::vector<rhi::Barrier> barriers;
+    for (uint32_t l = first; l < first + count; ++l) {
+        const size_t cell = level + size_t{l} * r.mips;
+        if (written[cell])
+            barriers.push_back({.buffer = buffers[dst],
+                                .texture = textures[dst],
+                                .range = r.is_image ? rhi::Subresources{level, 1, l, 1} : rhi::Subresources{},
+                                .before = Access::CopyWrite,
+                                .after = Access::CopyWrite});
+        written[cell] = true;
+    }
+    if (!barriers.empty()) Graph::emit(encoder, barriers);
+}
+
 void Runner::Impl::record(rhi::CommandEncoder& encoder, const GraphPass& pass, const Prepared& prepared) {
     if (const auto* d = std::get_if<DispatchCommand>(&pass.command)) {
         if (d->indirect == ~0u && (d->groups[0] == 0 || d->groups[1] == 0 || d->groups[2] == 0)) return;
@@ -433,7 +456,9 @@ void Runner::Impl::record(rhi::CommandEncoder& encoder, const GraphPass& pass, c
         const bool from_image = plan.resources[c->src].is_image, to_image = plan.resources[c->dst].is_image;
         if (!from_image && !to_image)
             encoder.copy_buffer(buffers[c->src], c->src_offset, buffers[c->dst], c->dst_offset, c->size);
+        std::vector<bool> written(plan.resources[c->dst].subresources());
         for (const CopyRegion& region : c->regions) {
+            between_regions(encoder, c->dst, region, written);
             const rhi::TexturePlace place{.mip = region.mip, .origin = region.origin};
             const rhi::BufferLayout layout{.offset = region.buffer_offset,
                                            .bytes_per_row = region.bytes_per_row,

@@ -258,6 +258,31 @@ TEST_F(RunnerTest, UploadsChangeSizeWithoutTrouble) {
     }
 }
 
+TEST_F(RunnerTest, CopiesOfManyRegionsReachOneImageInOrder) {
+    Runner runner(*device_);
+    std::vector<uint16_t> texels(64 * 4);
+    for (size_t i = 0; i < texels.size(); ++i) texels[i] = uint16_t(i);
+    Graph g(runner);
+    Image array =
+        g.create("array", {.size = {4, 4, 2}, .format = rhi::Format::R16Uint, .dimension = rhi::Dimension::D2Array});
+    g.clear(array);
+    const Buffer source = g.upload("texels", std::span<const uint16_t>(texels));
+    const CopyRegion in[] = {{.buffer_offset = 0, .size = {2, 2}},
+                             {.buffer_offset = 16, .origin = {2, 0, 0}, .size = {2, 2}},
+                             {.buffer_offset = 32, .origin = {1, 1, 0}, .size = {2, 2, 2}}};
+    g.copy(source, array, in);
+    Buffer out = g.create_buffer("out", 64);
+    g.clear(out);
+    const CopyRegion back[] = {{.buffer_offset = 0, .size = {4, 4}},
+                               {.buffer_offset = 32, .origin = {0, 0, 1}, .size = {4, 4}}};
+    g.copy(array, out, back);
+    const Readback r = g.readback(out);
+    must(runner.execute(g));
+    EXPECT_EQ(must(r.get_as<uint16_t>()),
+              (std::vector<uint16_t>{0, 1, 8, 9, 2, 16, 17, 11, 0, 18, 19, 0, 0, 0, 0, 0,  //
+                                     0, 0, 0, 0, 0, 20, 21, 0,  0, 22, 23, 0, 0, 0, 0, 0}));
+}
+
 TEST_F(RunnerTest, KernelsAreReplacedOnlyByTheirLike) {
     Runner runner(*device_);
     must(runner.pipelines().warm_up(kKernels));
