@@ -38,5 +38,7 @@ list(REVERSE kiln_link)
 list(TRANSFORM kiln_link PREPEND "-lkiln_")
 list(APPEND kiln_link ${pc_libs})
 list(JOIN kiln_link " " KILN_PC_LIBS)
+file(RELATIVE_PATH KILN_PC_TO_PREFIX /${CMAKE_INSTALL_LIBDIR}/pkgconfig /)  # so that the tree may be moved
+string(REGEX REPLACE "/$" "" KILN_PC_TO_PREFIX "${KILN_PC_TO_PREFIX}")
 configure_file(cmake/kiln.pc.in ${PROJECT_BINARY_DIR}/kiln.pc @ONLY)
 install(FILES ${PROJECT_BINARY_DIR}/kiln.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig)
