@@ -44,7 +44,12 @@ void build_field(benchmark::State& state) {
     state.counters["tested"] = double(tested);
     state.counters["d(0,0,0)"] = sdf::evaluate(sdf::view(*p), dvec3{0, 0, 0});
 }
-BENCHMARK(build_field)->Args({0, 1000})->Args({1, 1000})->Args({2, 1000})->Args({0, 10000})->Unit(benchmark::kMillisecond);
+BENCHMARK(build_field)
+    ->Args({0, 1000})
+    ->Args({1, 1000})
+    ->Args({2, 1000})
+    ->Args({0, 10000})
+    ->Unit(benchmark::kMillisecond);
 
 void bake_bricks(benchmark::State& state) {
     const auto field = *field::Field::build(program(recipe(int(state.range(0)), 5, 1000)), options());

@@ -11,10 +11,11 @@ int main() {
     const kiln::MaterialId glaze = world.add_material("glaze", {.base_color = {0.02f, 0.2f, 0.35f}, .roughness = 0.1f});
 
     (void)world.add({.name = "bowl", .node = {.shape = kiln::Sphere{.radius = 1}, .material = clay}});
-    (void)world.add({.name = "hollow",
-                     .node = {.shape = kiln::Sphere{.radius = 0.85f}, .transform = {.position = {0, 0.45f, 0}}, .material = glaze},
-                     .op = kiln::Op::Subtract,
-                     .blend_radius = 0.1f});
+    (void)world.add(
+        {.name = "hollow",
+         .node = {.shape = kiln::Sphere{.radius = 0.85f}, .transform = {.position = {0, 0.45f, 0}}, .material = glaze},
+         .op = kiln::Op::Subtract,
+         .blend_radius = 0.1f});
 
     std::printf("distance at (0, 2, 0): %.3f m\n", double(world.distance({0, 2, 0})));
 

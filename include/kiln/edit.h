@@ -29,12 +29,12 @@ using MaterialId = Id<struct MaterialTag>;
 /// glTF 2.0 metallic-roughness, scene-linear Rec. 709.
 struct Material {
     vec3 base_color{0.5f, 0.5f, 0.5f};
-    float roughness = 0.7f;      ///< perceptual, [0, 1]; alpha = roughness²
-    float metallic = 0.0f;       ///< [0, 1]
-    vec3 emissive{0, 0, 0};      ///< radiance, cd/m²
-    float opacity = 1.0f;        ///< (0, 1]; below 1 the forward pass draws it
-    float friction = 0.5f;       ///< >= 0
-    float restitution = 0.0f;    ///< [0, 1]
+    float roughness = 0.7f;    ///< perceptual, [0, 1]; alpha = roughness²
+    float metallic = 0.0f;     ///< [0, 1]
+    vec3 emissive{0, 0, 0};    ///< radiance, cd/m²
+    float opacity = 1.0f;      ///< (0, 1]; below 1 the forward pass draws it
+    float friction = 0.5f;     ///< >= 0
+    float restitution = 0.0f;  ///< [0, 1]
     friend bool operator==(const Material&, const Material&) = default;
 };
 
@@ -66,13 +66,13 @@ struct Node {
     Kind kind = Kind::Shape;
     Shape shape{};
     ObjectId object{};
-    Op op = Op::Union;                    ///< Fold: combines the children from left to right (never Paint)
-    float blend_radius = 0;               ///< Fold: in the node's own units
-    float material_blend_radius = -1;     ///< Fold: likewise, for materials; negative: same as blend_radius
-    std::vector<uint32_t> children{};     ///< Fold: indices into Object::nodes
+    Op op = Op::Union;                 ///< Fold: combines the children from left to right (never Paint)
+    float blend_radius = 0;            ///< Fold: in the node's own units
+    float material_blend_radius = -1;  ///< Fold: likewise, for materials; negative: same as blend_radius
+    std::vector<uint32_t> children{};  ///< Fold: indices into Object::nodes
     Transform transform{};
     std::vector<Warp> domain{};
-    MaterialId material{};                ///< none: the parent's
+    MaterialId material{};  ///< none: the parent's
     friend bool operator==(const Node&, const Node&) = default;
 };
 
@@ -85,13 +85,13 @@ struct Object {
 
 /// One entry of the world's ordered list. `node.kind` is Shape or Object.
 struct Edit {
-    std::string name{};                   ///< the scene file's `id`; unique in a world, made up when empty
+    std::string name{};  ///< the scene file's `id`; unique in a world, made up when empty
     Node node{};
     Op op = Op::Union;
-    float blend_radius = 0;               ///< world metres; the |a − b| where blending begins
-    float material_blend_radius = -1;     ///< world metres; negative: same as blend_radius
-    bool dynamic = false;                 ///< hint: moves often
-    bool hidden = false;                  ///< kept in the list, acts on nothing
+    float blend_radius = 0;            ///< world metres; the |a − b| where blending begins
+    float material_blend_radius = -1;  ///< world metres; negative: same as blend_radius
+    bool dynamic = false;              ///< hint: moves often
+    bool hidden = false;               ///< kept in the list, acts on nothing
     std::string group{};
     friend bool operator==(const Edit&, const Edit&) = default;
 };

@@ -44,9 +44,7 @@ constexpr vec3 operator*(vec3 a, float s) { return {a.x * s, a.y * s, a.z * s}; 
 constexpr vec3 operator*(float s, vec3 a) { return a * s; }
 constexpr vec3 operator/(vec3 a, float s) { return {a.x / s, a.y / s, a.z / s}; }
 constexpr float dot(vec3 a, vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-constexpr vec3 cross(vec3 a, vec3 b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
+constexpr vec3 cross(vec3 a, vec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 inline float length(vec3 a) { return std::sqrt(dot(a, a)); }
 inline vec3 normalize(vec3 a) { return a / length(a); }
 constexpr vec3 min(vec3 a, vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }

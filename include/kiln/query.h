@@ -10,9 +10,9 @@ namespace kiln {
 
 /// Answer at one point, world space.
 struct FieldSample {
-    float distance = 0;    ///< metres, negative inside: the value of the ordered program, a lower bound of the true distance
-    vec3 normal;           ///< unit gradient of the distance; (0, 0, 0) where it vanishes or nothing exists
-    MaterialId material;   ///< the heaviest material at the point; none in an empty world
+    float distance = 0;   ///< metres, negative inside; the ordered program's value, a lower bound of the true distance
+    vec3 normal;          ///< unit gradient of the distance; (0, 0, 0) where it vanishes or nothing exists
+    MaterialId material;  ///< the heaviest material at the point; none in an empty world
 };
 
 struct Ray {
@@ -23,10 +23,10 @@ struct Ray {
 
 struct RayHit {
     bool hit = false;
-    float t = 0;           ///< metres along the ray
+    float t = 0;  ///< metres along the ray
     vec3 position;
     vec3 normal;
-    EditId edit;           ///< the edit with the largest share at the hit, ties to the later
+    EditId edit;  ///< the edit with the largest share at the hit, ties to the later
 };
 
 /// Where a question is answered from.

@@ -26,8 +26,8 @@ struct Camera {
     vec3 position{3, 2, 4};
     vec3 target{0, 0, 0};
     vec3 up{0, 1, 0};
-    float fov_y_deg = 45;      ///< (0, 180)
-    float exposure = 1.0f;     ///< linear multiplier before the tone map, > 0
+    float fov_y_deg = 45;   ///< (0, 180)
+    float exposure = 1.0f;  ///< linear multiplier before the tone map, > 0
     ToneMap tone_map = ToneMap::Aces;
 };
 
@@ -36,18 +36,18 @@ struct Light {
     enum class Kind : uint8_t { Directional, Point, Spot };
     Kind kind = Kind::Directional;
     vec3 color{1, 1, 1};
-    vec3 direction{-0.4f, -1, -0.3f};   ///< Directional, Spot: where the light goes; any length > 0
-    vec3 position{};                    ///< Point, Spot
-    float illuminance = 3;              ///< Directional
-    float angular_diameter_deg = 0.53f; ///< Directional: disc seen from the ground; 0 is a hard shadow
-    float intensity = 20;               ///< Point, Spot
-    float range = 0;                    ///< Point, Spot: where the light has faded to 0; 0 is no limit
-    float radius = 0;                   ///< Point, Spot: metres, for soft shadows; 0 is a hard shadow
+    vec3 direction{-0.4f, -1, -0.3f};      ///< Directional, Spot: where the light goes; any length > 0
+    vec3 position{};                       ///< Point, Spot
+    float illuminance = 3;                 ///< Directional
+    float angular_diameter_deg = 0.53f;    ///< Directional: disc seen from the ground; 0 is a hard shadow
+    float intensity = 20;                  ///< Point, Spot
+    float range = 0;                       ///< Point, Spot: where the light has faded to 0; 0 is no limit
+    float radius = 0;                      ///< Point, Spot: metres, for soft shadows; 0 is a hard shadow
     float inner_deg = 15, outer_deg = 25;  ///< Spot: half angles of full and of no light
 };
 
 struct Environment {
-    vec3 color{0.5f, 0.6f, 0.8f};       ///< radiance of a constant sky
+    vec3 color{0.5f, 0.6f, 0.8f};  ///< radiance of a constant sky
     float intensity = 1;
 };
 
@@ -60,24 +60,24 @@ struct Frame {
     std::vector<Light> lights;
     Environment environment;
     Camera camera;
-    int coarsened = 0;                          ///< times the voxel size was doubled to fit the pool
+    int coarsened = 0;  ///< times the voxel size was doubled to fit the pool
 };
 
 struct RenderSettings {
-    int width = 1280, height = 720;   ///< pixels, 1 to 16384
+    int width = 1280, height = 720;  ///< pixels, 1 to 16384
     View view = View::Shaded;
-    bool analytic = false;            ///< march the exact program instead of the bricks (D15)
-    bool unpruned = false;            ///< with analytic: every edit at every step, no culling
-    bool accelerate = true;           ///< false: visit every cell and voxel (the slow twin of the jumps)
-    bool atlas_by_copy = false;       ///< bake to a buffer and copy, instead of to a storage image
+    bool analytic = false;       ///< march the exact program instead of the bricks (D15)
+    bool unpruned = false;       ///< with analytic: every edit at every step, no culling
+    bool accelerate = true;      ///< false: visit every cell and voxel (the slow twin of the jumps)
+    bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
 };
 
 /// Pixels, top row first.
 struct Picture {
     int width = 0, height = 0;
-    std::vector<float> rgba;          ///< scene-linear before the tone map (or the view's values); 4 floats a pixel
-    std::vector<uint8_t> srgb;        ///< what a screen shows: tone-mapped sRGB, 4 bytes a pixel
-    std::vector<float> depth;         ///< metres along the ray, +infinity where nothing is hit
+    std::vector<float> rgba;    ///< scene-linear before the tone map (or the view's values); 4 floats a pixel
+    std::vector<uint8_t> srgb;  ///< what a screen shows: tone-mapped sRGB, 4 bytes a pixel
+    std::vector<float> depth;   ///< metres along the ray, +infinity where nothing is hit
     /// Writes .png (srgb) or .exr (rgba as half; the depth view as 32-bit float). The file appears whole or not at all.
     Result<void> save(const std::string& path) const;
     View view = View::Shaded;
@@ -86,26 +86,26 @@ struct Picture {
 /// What one render cost.
 struct RenderStats {
     std::string device;
-    int bricks = 0;                               ///< resident
+    int bricks = 0;  ///< resident
     int edits = 0;
-    double frame_ms = 0;                          ///< GPU time, all passes
+    double frame_ms = 0;                                 ///< GPU time, all passes
     std::vector<std::pair<std::string, double>> passes;  ///< name, GPU ms, in order of execution
-    uint64_t evaluations = 0;                     ///< distance samples taken by the primary march
+    uint64_t evaluations = 0;                            ///< distance samples taken by the primary march
     uint64_t atlas_bytes = 0, host_bytes = 0;
-    uint64_t pipelines_created = 0;               ///< since creation; constant once warm
-    int coarsened = 0;                            ///< times the voxel size was doubled to fit the pool
+    uint64_t pipelines_created = 0;  ///< since creation; constant once warm
+    int coarsened = 0;               ///< times the voxel size was doubled to fit the pool
 };
 
 struct DeviceInfo {
-    std::string name, backend, driver, kind;      ///< kind: "cpu", "integrated", "discrete", "virtual", "other"
+    std::string name, backend, driver, kind;  ///< kind: "cpu", "integrated", "discrete", "virtual", "other"
     std::string api_version;
     bool usable = false;
-    std::string why_not;                          ///< when not usable
+    std::string why_not;  ///< when not usable
 };
 
 struct RendererOptions {
-    std::string device = "auto";      ///< "auto", "cpu-vulkan", or part of a device's name
-    bool validation = false;          ///< Vulkan validation layer; its first message fails the call that caused it
+    std::string device = "auto";  ///< "auto", "cpu-vulkan", or part of a device's name
+    bool validation = false;      ///< Vulkan validation layer; its first message fails the call that caused it
 };
 
 /// Owner's thread only.
@@ -127,7 +127,8 @@ private:
 };
 
 /// Path-traces the frame on the CPU, `samples` a pixel: slow, needs no device; the judge of the renderer. Shaded view only.
-Result<Picture> render_reference(const Frame& frame, const RenderSettings& settings, int samples, RenderStats* stats = nullptr);
+Result<Picture> render_reference(const Frame& frame, const RenderSettings& settings, int samples,
+                                 RenderStats* stats = nullptr);
 
 /// Every device that could render here, usable or not; empty without a driver. Never fails.
 std::vector<DeviceInfo> devices();

@@ -19,11 +19,11 @@
 namespace kiln {
 
 struct FieldSettings {
-    float voxel_size = 0;                 ///< metres; 0: longest finite side / 256
-    int cells = 64;                       ///< a side per level, a power of two (clipmap levels; one level covers the edits)
+    float voxel_size = 0;  ///< metres; 0: longest finite side / 256
+    int cells = 64;        ///< a side per level, a power of two (clipmap levels; one level covers the edits)
     int levels = 1;
-    std::optional<Box3> bounds;           ///< none: the finite edits', inflated by 10 %
-    bool distance_8bit = false;           ///< bricks store distance in 8 bits instead of 16
+    std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %
+    bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16
 };
 
 class World {
@@ -46,12 +46,12 @@ public:
     Result<EditId> add(Edit edit);
     Result<void> change(EditId id, Edit edit);
     Result<void> remove(EditId id);
-    const Edit* find(EditId id) const;     ///< null when stale; valid until the next change
+    const Edit* find(EditId id) const;  ///< null when stale; valid until the next change
     std::optional<EditId> find_edit(std::string_view name) const;
-    std::vector<EditId> edits() const;     ///< in order
+    std::vector<EditId> edits() const;  ///< in order
 
     FieldSettings field_settings;
-    std::vector<Light> lights;             ///< none: a default sun and sky
+    std::vector<Light> lights;  ///< none: a default sun and sky
     std::optional<Environment> environment;
     std::vector<std::pair<std::string, Camera>> cameras;  ///< none: framed automatically
 
@@ -93,10 +93,10 @@ void discard_unfinished_files() noexcept;
 
 /// How far two images are apart. Mean over pixels.
 struct ImageDifference {
-    double flip = 0;   ///< LDR-FLIP at 67 pixels per degree, 0 (same) to 1
-    double psnr = 0;   ///< dB, infinity when equal
-    double ssim = 0;   ///< 1 when equal
-    double max_abs = 0;///< largest channel difference, 0 to 1
+    double flip = 0;     ///< LDR-FLIP at 67 pixels per degree, 0 (same) to 1
+    double psnr = 0;     ///< dB, infinity when equal
+    double ssim = 0;     ///< 1 when equal
+    double max_abs = 0;  ///< largest channel difference, 0 to 1
 };
 Result<ImageDifference> compare_images(const std::string& a, const std::string& b);
 

@@ -9,11 +9,12 @@
 #include "field/words.gpu.h"
 
 KILN_FIELD_BEGIN
-KILN_CONST int kBrickTexels = 8;        // texels a side
-KILN_CONST int kBrickVoxels = 7;        // voxels (and texel steps) a side
+KILN_CONST int kBrickTexels = 8;  // texels a side
+KILN_CONST int kBrickVoxels = 7;  // voxels (and texel steps) a side
 KILN_CONST int kBrickTexelCount = 512;
-KILN_CONST float kBandVoxels = 4.0f;    // stored distances are clamped to this many voxels
-KILN_CONST float kTrilinearErrorVoxels = 0.8661f;  // sqrt(3)/2: a trilinear value minus this is a lower bound of the distance
+KILN_CONST float kBandVoxels = 4.0f;  // stored distances are clamped to this many voxels
+KILN_CONST float kTrilinearErrorVoxels =
+    0.8661f;  // sqrt(3)/2: a trilinear value minus this is a lower bound of the distance
 
 // Cell word: occupied (bit 31) with the brick's slot in the low 24 bits; or empty, with its sign (bit 30: inside) and the jump.
 // jump: Chebyshev distance in cells to the nearest occupied cell, capped; every cell nearer than that is empty and of the same sign.
@@ -32,10 +33,11 @@ struct BrickRecord {
 
 // The grid (32 bytes): cell (x, y, z) of the world is at index ((z - cell_z) * size_y + (y - cell_y)) * size_x + (x - cell_x).
 struct GridParams {
-    int cell_x, cell_y, cell_z;     // first cell of the grid, in world cells of 7 voxels
-    float voxel_size;               // metres
-    int size_x, size_y, size_z;     // cells
-    uint atlas_bricks_x_y;          // bricks along x of the atlas in the low 16 bits, along y in the high; slot = (bz * by + y) * bx + x
+    int cell_x, cell_y, cell_z;  // first cell of the grid, in world cells of 7 voxels
+    float voxel_size;            // metres
+    int size_x, size_y, size_z;  // cells
+    uint
+        atlas_bricks_x_y;  // bricks along x of the atlas in the low 16 bits, along y in the high; slot = (bz * by + y) * bx + x
 };
 
 // Material texel, 16 bits: palette slots (4 bits each) of the two heaviest materials and the second's share in [0, 1/2] as 0 … 255.

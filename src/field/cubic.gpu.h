@@ -29,9 +29,11 @@ KILN_FN Cubic cubic_along(Corners c, vec3 p, vec3 q) {
     Cubic cubic;
     cubic.b0 = trilinear_value(c, p);
     cubic.b1 = (trilinear_value(c, vec3(q.x, p.y, p.z)) + trilinear_value(c, vec3(p.x, q.y, p.z)) +
-                trilinear_value(c, vec3(p.x, p.y, q.z))) * 0.33333334f;
+                trilinear_value(c, vec3(p.x, p.y, q.z))) *
+               0.33333334f;
     cubic.b2 = (trilinear_value(c, vec3(p.x, q.y, q.z)) + trilinear_value(c, vec3(q.x, p.y, q.z)) +
-                trilinear_value(c, vec3(q.x, q.y, p.z))) * 0.33333334f;
+                trilinear_value(c, vec3(q.x, q.y, p.z))) *
+               0.33333334f;
     cubic.b3 = trilinear_value(c, q);
     return cubic;
 }
@@ -51,7 +53,10 @@ KILN_FN float cubic_bracketed(Cubic c, float lo, float hi, float value_lo, float
     float s = lo + (hi - lo) * (value_lo / (value_lo - value_hi));
     for (int i = 0; i < 24; i++) {
         float value = cubic_value(c, s);
-        if (value > 0.0f) lo = s; else hi = s;
+        if (value > 0.0f)
+            lo = s;
+        else
+            hi = s;
         float slope = cubic_slope(c, s);
         float next = slope < 0.0f ? s - value / slope : lo;
         if (!(next >= lo && next <= hi)) next = 0.5f * (lo + hi);

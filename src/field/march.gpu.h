@@ -37,7 +37,8 @@ KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_
         float out_any = min(min(out_x, out_y), out_z);
         float exit = max(min(out_any, leave), enter);
         hit.voxels++;
-        Cubic cubic = cubic_along(field_corners(slot, voxel), voxel_point(ray, voxel, enter), voxel_point(ray, voxel, exit));
+        Cubic cubic =
+            cubic_along(field_corners(slot, voxel), voxel_point(ray, voxel, enter), voxel_point(ray, voxel, exit));
         float root = cubic_first_root(cubic);
         if (root <= 1.0f) {
             float s = enter + root * (exit - enter);
@@ -49,10 +50,14 @@ KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_
         }
         if (out_any >= leave) return false;
         enter = exit;
-        if (out_any == out_x) voxel.x += up_x ? 1 : -1;
-        else if (out_any == out_y) voxel.y += up_y ? 1 : -1;
-        else voxel.z += up_z ? 1 : -1;
-        if (min(min(voxel.x, voxel.y), voxel.z) < 0 || max(max(voxel.x, voxel.y), voxel.z) >= kBrickVoxels) return false;
+        if (out_any == out_x)
+            voxel.x += up_x ? 1 : -1;
+        else if (out_any == out_y)
+            voxel.y += up_y ? 1 : -1;
+        else
+            voxel.z += up_z ? 1 : -1;
+        if (min(min(voxel.x, voxel.y), voxel.z) < 0 || max(max(voxel.x, voxel.y), voxel.z) >= kBrickVoxels)
+            return false;
     }
     return false;
 }
@@ -85,13 +90,19 @@ KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t
     ivec3 whole = ivec3(ray.whole.x - grid.cell_x * kBrickVoxels, ray.whole.y - grid.cell_y * kBrickVoxels,
                         ray.whole.z - grid.cell_z * kBrickVoxels);
     float t = t_min;
-    t = max(t, texel_plane_crossing(up_x ? 0 : grid.size_x * kBrickVoxels, whole.x, ray.part.x, ray.inverse.x, -kFarVoxels));
-    t = max(t, texel_plane_crossing(up_y ? 0 : grid.size_y * kBrickVoxels, whole.y, ray.part.y, ray.inverse.y, -kFarVoxels));
-    t = max(t, texel_plane_crossing(up_z ? 0 : grid.size_z * kBrickVoxels, whole.z, ray.part.z, ray.inverse.z, -kFarVoxels));
+    t = max(t, texel_plane_crossing(up_x ? 0 : grid.size_x * kBrickVoxels, whole.x, ray.part.x, ray.inverse.x,
+                                    -kFarVoxels));
+    t = max(t, texel_plane_crossing(up_y ? 0 : grid.size_y * kBrickVoxels, whole.y, ray.part.y, ray.inverse.y,
+                                    -kFarVoxels));
+    t = max(t, texel_plane_crossing(up_z ? 0 : grid.size_z * kBrickVoxels, whole.z, ray.part.z, ray.inverse.z,
+                                    -kFarVoxels));
     float end = t_max;
-    end = min(end, texel_plane_crossing(up_x ? grid.size_x * kBrickVoxels : 0, whole.x, ray.part.x, ray.inverse.x, kFarVoxels));
-    end = min(end, texel_plane_crossing(up_y ? grid.size_y * kBrickVoxels : 0, whole.y, ray.part.y, ray.inverse.y, kFarVoxels));
-    end = min(end, texel_plane_crossing(up_z ? grid.size_z * kBrickVoxels : 0, whole.z, ray.part.z, ray.inverse.z, kFarVoxels));
+    end = min(end, texel_plane_crossing(up_x ? grid.size_x * kBrickVoxels : 0, whole.x, ray.part.x, ray.inverse.x,
+                                        kFarVoxels));
+    end = min(end, texel_plane_crossing(up_y ? grid.size_y * kBrickVoxels : 0, whole.y, ray.part.y, ray.inverse.y,
+                                        kFarVoxels));
+    end = min(end, texel_plane_crossing(up_z ? grid.size_z * kBrickVoxels : 0, whole.z, ray.part.z, ray.inverse.z,
+                                        kFarVoxels));
     if (!(t <= end)) return hit;
     ivec3 cell;
     cell.x = cell_at(whole.x, ray.part.x, ray.direction.x, t);

@@ -48,7 +48,8 @@ KILN_FN vec3 dual_gradient(int slot, ivec3 cell, vec3 p) {
             owner = field_slot(ivec3(cell.x + away.x, cell.y + away.y, cell.z + away.z));
             if (owner < 0) continue;
         }
-        ivec3 local = ivec3(voxel.x - away.x * kBrickVoxels, voxel.y - away.y * kBrickVoxels, voxel.z - away.z * kBrickVoxels);
+        ivec3 local =
+            ivec3(voxel.x - away.x * kBrickVoxels, voxel.y - away.y * kBrickVoxels, voxel.z - away.z * kBrickVoxels);
         vec3 at = vec3(p.x - float(voxel.x), p.y - float(voxel.y), p.z - float(voxel.z));
         float weight = (step.x == 1 ? s.x - 0.5f : 1.5f - s.x) * (step.y == 1 ? s.y - 0.5f : 1.5f - s.y) *
                        (step.z == 1 ? s.z - 0.5f : 1.5f - s.z);
@@ -73,15 +74,20 @@ KILN_FN float field_value_near(int slot, ivec3 cell, vec3 p) {
                           min(max(voxel.z, 0), kBrickVoxels - 1));
         }
     }
-    ivec3 local = ivec3(voxel.x - away.x * kBrickVoxels, voxel.y - away.y * kBrickVoxels, voxel.z - away.z * kBrickVoxels);
-    return trilinear_value(field_corners(owner, local), vec3(p.x - float(voxel.x), p.y - float(voxel.y), p.z - float(voxel.z)));
+    ivec3 local =
+        ivec3(voxel.x - away.x * kBrickVoxels, voxel.y - away.y * kBrickVoxels, voxel.z - away.z * kBrickVoxels);
+    return trilinear_value(field_corners(owner, local),
+                           vec3(p.x - float(voxel.x), p.y - float(voxel.y), p.z - float(voxel.z)));
 }
 
 // Central differences, half a voxel each way: second order.
 KILN_FN vec3 central_gradient(int slot, ivec3 cell, vec3 p) {
-    float x = field_value_near(slot, cell, vec3(p.x + 0.5f, p.y, p.z)) - field_value_near(slot, cell, vec3(p.x - 0.5f, p.y, p.z));
-    float y = field_value_near(slot, cell, vec3(p.x, p.y + 0.5f, p.z)) - field_value_near(slot, cell, vec3(p.x, p.y - 0.5f, p.z));
-    float z = field_value_near(slot, cell, vec3(p.x, p.y, p.z + 0.5f)) - field_value_near(slot, cell, vec3(p.x, p.y, p.z - 0.5f));
+    float x = field_value_near(slot, cell, vec3(p.x + 0.5f, p.y, p.z)) -
+              field_value_near(slot, cell, vec3(p.x - 0.5f, p.y, p.z));
+    float y = field_value_near(slot, cell, vec3(p.x, p.y + 0.5f, p.z)) -
+              field_value_near(slot, cell, vec3(p.x, p.y - 0.5f, p.z));
+    float z = field_value_near(slot, cell, vec3(p.x, p.y, p.z + 0.5f)) -
+              field_value_near(slot, cell, vec3(p.x, p.y, p.z - 0.5f));
     return vec3(x, y, z);
 }
 
@@ -107,7 +113,8 @@ KILN_FN SurfaceMaterial surface_material(int slot, ivec3 voxel, vec3 p) {
     for (int i = 0; i < 16; i++) weight[i] = 0.0f;
     for (int i = 0; i < 8; i++) {
         ivec3 step = ivec3(i & 1, (i >> 1) & 1, i >> 2);
-        float w = (step.x == 1 ? p.x : 1.0f - p.x) * (step.y == 1 ? p.y : 1.0f - p.y) * (step.z == 1 ? p.z : 1.0f - p.z);
+        float w =
+            (step.x == 1 ? p.x : 1.0f - p.x) * (step.y == 1 ? p.y : 1.0f - p.y) * (step.z == 1 ? p.z : 1.0f - p.z);
         uint word = field_material(slot, ivec3(voxel.x + step.x, voxel.y + step.y, voxel.z + step.z));
         float share = material_share(word);
         weight[material_slot0(word)] += w * (1.0f - share);

@@ -28,9 +28,12 @@ KILN_FN float trilinear_value(Corners c, vec3 p) {
 
 // Gradient at p, per voxel. Also outside the voxel, where the polynomial goes on.
 KILN_FN vec3 trilinear_gradient(Corners c, vec3 p) {
-    float x = lerp_exact(lerp_exact(c.v100 - c.v000, c.v110 - c.v010, p.y), lerp_exact(c.v101 - c.v001, c.v111 - c.v011, p.y), p.z);
-    float y = lerp_exact(lerp_exact(c.v010 - c.v000, c.v110 - c.v100, p.x), lerp_exact(c.v011 - c.v001, c.v111 - c.v101, p.x), p.z);
-    float z = lerp_exact(lerp_exact(c.v001 - c.v000, c.v101 - c.v100, p.x), lerp_exact(c.v011 - c.v010, c.v111 - c.v110, p.x), p.y);
+    float x = lerp_exact(lerp_exact(c.v100 - c.v000, c.v110 - c.v010, p.y),
+                         lerp_exact(c.v101 - c.v001, c.v111 - c.v011, p.y), p.z);
+    float y = lerp_exact(lerp_exact(c.v010 - c.v000, c.v110 - c.v100, p.x),
+                         lerp_exact(c.v011 - c.v001, c.v111 - c.v101, p.x), p.z);
+    float z = lerp_exact(lerp_exact(c.v001 - c.v000, c.v101 - c.v100, p.x),
+                         lerp_exact(c.v011 - c.v010, c.v111 - c.v110, p.x), p.y);
     return vec3(x, y, z);
 }
 

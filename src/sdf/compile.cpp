@@ -54,7 +54,8 @@ AffineMap then(const AffineMap& a, const AffineMap& b) {
         }
     }
     const auto det = [](const std::array<double, 9>& m) {
-        return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+        return m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) +
+               m[2] * (m[3] * m[7] - m[4] * m[6]);
     };
     const double d = det(a.m);
     for (size_t column = 0; column < 3; ++column) {
@@ -88,12 +89,12 @@ struct Binary {
 struct Task {
     const Node* node;
     const NodeBounds* bounds;
-    uint32_t object;      // whose nodes the node's children are
-    size_t entries;       // domain entries still to pass, last first
-    bool entered;         // transform and material already applied
-    AffineMap pending;    // since the chain's last step
+    uint32_t object;    // whose nodes the node's children are
+    size_t entries;     // domain entries still to pass, last first
+    bool entered;       // transform and material already applied
+    AffineMap pending;  // since the chain's last step
     uint32_t chain;
-    double scale;         // local metres to world metres, divided by the Lipschitz factors so far
+    double scale;  // local metres to world metres, divided by the Lipschitz factors so far
     uint32_t material;
     uint32_t parent;
     bool right;
@@ -120,7 +121,8 @@ public:
             const float k_material = edit.material_blend_radius < 0 ? k : edit.material_blend_radius;
             expand(edit);
             deal_registers();
-            if (nodes_[0].need >= kRegisters) return Error{"edit " + edit.name + ": needs too many registers", ErrorKind::Input};
+            if (nodes_[0].need >= kRegisters)
+                return Error{"edit " + edit.name + ": needs too many registers", ErrorKind::Input};
             emit(0, 1);
             const uint32_t at = uint32_t(out_.params.size());
             out_.params.insert(out_.params.end(), {k, k_material});
@@ -166,8 +168,8 @@ private:
         if (chain == kNone && map.linear_identity()) {
             return add_step(kNone, Opcode::PointTranslate, 0, add_params({f(map.t[0]), f(map.t[1]), f(map.t[2])}));
         }
-        const uint32_t at = add_params({f(map.t[0]), f(map.t[1]), f(map.t[2]), f(map.m[0]), f(map.m[1]), f(map.m[2]), f(map.m[3]),
-                                        f(map.m[4]), f(map.m[5]), f(map.m[6]), f(map.m[7]), f(map.m[8])});
+        const uint32_t at = add_params({f(map.t[0]), f(map.t[1]), f(map.t[2]), f(map.m[0]), f(map.m[1]), f(map.m[2]),
+                                        f(map.m[3]), f(map.m[4]), f(map.m[5]), f(map.m[6]), f(map.m[7]), f(map.m[8])});
         return add_step(chain, chain == kNone ? Opcode::PointAffine : Opcode::PointAffineOn, 0, at);
     }
 
@@ -184,8 +186,17 @@ private:
         tasks_.clear();
         const bool shows_others = edit.op == Op::Subtract || edit.op == Op::Intersect;
         const uint32_t material = shows_others ? kNoMaterial : kDefaultMaterial;
-        tasks_.push_back({&edit.node, &resolved_.edit_bounds[edit_], kNone, edit.node.domain.size(), false, {}, kNone, 1.0, material,
-                          kNone, false});
+        tasks_.push_back({&edit.node,
+                          &resolved_.edit_bounds[edit_],
+                          kNone,
+                          edit.node.domain.size(),
+                          false,
+                          {},
+                          kNone,
+                          1.0,
+                          material,
+                          kNone,
+                          false});
         while (!tasks_.empty()) {
             Task task = tasks_.back();
             tasks_.pop_back();
@@ -217,14 +228,16 @@ private:
                 add_bound(task, chain, solid, factor.margin);
                 if (how == KindRow::Point) {
                     const Box3 wide = solid.inflated(factor.margin);
-                    task.chain = add_step(chain, Opcode::PointClamp, 0,
-                                          add_params({wide.min.x, wide.min.y, wide.min.z, wide.max.x, wide.max.y, wide.max.z}));
+                    task.chain =
+                        add_step(chain, Opcode::PointClamp, 0,
+                                 add_params({wide.min.x, wide.min.y, wide.min.z, wide.max.x, wide.max.y, wide.max.z}));
                     task.pending = {};
                 }
             }
             task.scale /= double(factor.lipschitz);
             if (how == KindRow::Point) {
-                task.chain = add_step(flush(task.chain, task.pending), Opcode::PointWarp, warp.kind, add_params({}, warp.params));
+                task.chain = add_step(flush(task.chain, task.pending), Opcode::PointWarp, warp.kind,
+                                      add_params({}, warp.params));
                 task.pending = {};
             } else {
                 Binary value;
@@ -245,8 +258,8 @@ private:
         Binary bound;
         bound.kind = Binary::Kind::Bound;
         bound.chain = chain;
-        bound.param = add_params({float(task.scale), float(double(margin) * task.scale), box.min.x, box.min.y, box.min.z, box.max.x,
-                                  box.max.y, box.max.z});
+        bound.param = add_params({float(task.scale), float(double(margin) * task.scale), box.min.x, box.min.y,
+                                  box.min.z, box.max.x, box.max.y, box.max.z});
         task.parent = add_node(task, bound);
         task.right = false;
     }
@@ -263,8 +276,11 @@ private:
                 spacing = std::min(spacing, warp.params[size_t(axis)]);
             }
         }
-        const auto middle = [](float lo, float hi) { return std::isfinite(lo) && std::isfinite(hi) ? 0.5f * (lo + hi) : 0.0f; };
-        const vec3 center{middle(child.min.x, child.max.x), middle(child.min.y, child.max.y), middle(child.min.z, child.max.z)};
+        const auto middle = [](float lo, float hi) {
+            return std::isfinite(lo) && std::isfinite(hi) ? 0.5f * (lo + hi) : 0.0f;
+        };
+        const vec3 center{middle(child.min.x, child.max.x), middle(child.min.y, child.max.y),
+                          middle(child.min.z, child.max.z)};
         const bool exact = task.entries == 0 && task.node->kind == Node::Kind::Shape &&
                            shape_rows()[task.node->shape.kind].how == KindRow::Exact;
         const uint32_t chain = flush(task.chain, task.pending);
@@ -286,8 +302,9 @@ private:
             copy.parent = holder.parent;
             float second[3] = {0, 0, 0};
             for (int i = 0; i < count; ++i) second[axes[i]] = (c >> i & 1u) != 0 ? 1.0f : 0.0f;
-            copy.chain = add_step(chain, Opcode::PointCopy, warp.kind,
-                                  add_params({center.x, center.y, center.z, second[0], second[1], second[2]}, warp.params));
+            copy.chain =
+                add_step(chain, Opcode::PointCopy, warp.kind,
+                         add_params({center.x, center.y, center.z, second[0], second[1], second[2]}, warp.params));
             copy.pending = {};
             if (!exact && count > 0) add_bound(copy, copy.chain, child, 0.5f * spacing);
             tasks_.push_back(copy);

@@ -29,12 +29,15 @@ const uint32_t* words(std::span<const Instruction> code) { return reinterpret_ca
 
 bool processor_has(Isa isa) {
     switch (isa) {
-        case Isa::Scalar: return true;
-        case Isa::Sse4: return __builtin_cpu_supports("sse4.1") != 0;
-        case Isa::Avx2: return __builtin_cpu_supports("avx2") != 0;
-        case Isa::Avx512:
-            return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
-                   __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
+    case Isa::Scalar:
+        return true;
+    case Isa::Sse4:
+        return __builtin_cpu_supports("sse4.1") != 0;
+    case Isa::Avx2:
+        return __builtin_cpu_supports("avx2") != 0;
+    case Isa::Avx512:
+        return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
+               __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
     }
     return false;
 }
@@ -77,8 +80,8 @@ void evaluate_materials(const TapeView& tape, const Points& points, float* out, 
     float id0[kBatch], id1[kBatch], share[kBatch];
     for (int at = 0; at < points.count; at += kBatch) {
         const int n = std::min(kBatch, points.count - at);
-        run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x + at, points.y + at, points.z + at, n, out + at,
-            id0, id1, share, edits ? 2 : 1);
+        run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x + at, points.y + at, points.z + at,
+            n, out + at, id0, id1, share, edits ? 2 : 1);
         for (int i = 0; i < n; ++i) mix[at + i] = {uint16_t(id0[i]), uint16_t(id1[i]), share[i]};
     }
 }

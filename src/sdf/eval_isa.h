@@ -8,13 +8,13 @@
 #include <cstddef>
 #include <cstdint>
 
-#define KILN_DECLARE_ISA(name)                                                                                                \
-    namespace kiln::sdf::name {                                                                                               \
-    void evaluate_points(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x,       \
-                         const float* y, const float* z, int points, float* out);                                             \
-    void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x,        \
-                        const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,         \
-                        int slot);                                                                                            \
+#define KILN_DECLARE_ISA(name)                                                                                         \
+    namespace kiln::sdf::name {                                                                                        \
+    void evaluate_points(const uint32_t* code, size_t count, const float* params, const float* samples,                \
+                         const float* x, const float* y, const float* z, int points, float* out);                      \
+    void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, \
+                        const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,  \
+                        int slot);                                                                                     \
     }
 KILN_DECLARE_ISA(scalar)
 KILN_DECLARE_ISA(sse4)

@@ -44,7 +44,8 @@ real3 into_node(const Transform& transform, real3 p) {
     };
     const real3 t = cross(u, v) * 2.0;
     const real3 turned = v + t * w + cross(u, t);
-    return real3(turned.x / double(transform.scale.x), turned.y / double(transform.scale.y), turned.z / double(transform.scale.z));
+    return real3(turned.x / double(transform.scale.x), turned.y / double(transform.scale.y),
+                 turned.z / double(transform.scale.z));
 }
 
 real3 to_real3(vec3 v) { return real3(v.x, v.y, v.z); }
@@ -54,7 +55,9 @@ double box_distance(real3 p, const Box3& box) {
     return length(max(q, real3(0, 0, 0))) + std::min(std::max({q.x, q.y, q.z}), 0.0);
 }
 
-double combine(Op op, double a, double b, double k) { return op == Op::Paint ? a : judging::op_distance(uint32_t(op), a, b, k); }
+double combine(Op op, double a, double b, double k) {
+    return op == Op::Paint ? a : judging::op_distance(uint32_t(op), a, b, k);
+}
 
 struct Frame {
     const Node* node;
@@ -62,8 +65,8 @@ struct Frame {
     uint32_t object;
     int level;
     real3 p;
-    uint32_t step = 0;   // children or copies already asked for
-    double value = 0;    // folded so far
+    uint32_t step = 0;  // children or copies already asked for
+    double value = 0;   // folded so far
 };
 
 }  // namespace
@@ -96,7 +99,8 @@ double Judge::distance(dvec3 p_world) const {
             const Node& node = *f.node;
             if (f.level < 0) {
                 if (f.step++ == 0) {
-                    stack.push_back({f.node, f.bounds, f.object, int(node.domain.size()), into_node(node.transform, f.p)});
+                    stack.push_back(
+                        {f.node, f.bounds, f.object, int(node.domain.size()), into_node(node.transform, f.p)});
                 } else {
                     answer *= double(smallest_scale(node.transform));
                     stack.pop_back();
@@ -179,12 +183,14 @@ double Judge::distance(dvec3 p_world) const {
                     stack.pop_back();
                 } else {
                     const uint32_t child = node.children[f.step++];
-                    const Frame next{&r.object(f.object).nodes[child], &r.object_bounds[f.object][child], f.object, -1, f.p};
+                    const Frame next{&r.object(f.object).nodes[child], &r.object_bounds[f.object][child], f.object, -1,
+                                     f.p};
                     stack.push_back(next);
                 }
             } else {
                 const std::array<float, kMaxParams> params = r.params_of(node.shape);
-                answer = judging::shape_distance(node.shape.kind, f.p, params.data(), judging::Samples{r.samples.data()});
+                answer =
+                    judging::shape_distance(node.shape.kind, f.p, params.data(), judging::Samples{r.samples.data()});
                 stack.pop_back();
             }
         }

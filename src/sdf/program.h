@@ -40,14 +40,14 @@ enum class Opcode : uint32_t {
     Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
     Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
     Bound,           // R[dst] = max(min(R[dst], m), s · signed distance(P, box))   s, m, lo[3] hi[3]
-    Combine,         // R[dst] = op[aux & 3](R[a], R[b], k)        k, k of materials. aux & 3 = Op (Paint keeps R[a]'s distance);
-                     //                                            aux & kMayLackMaterial: R[b] may carry no material
-    Move,            // R[dst] = R[a]
-    Negate,          // R[dst] = −R[a]
-    Empty,           // R[dst] = kEmpty, no material
+    Combine,  // R[dst] = op[aux & 3](R[a], R[b], k)        k, k of materials. aux & 3 = Op (Paint keeps R[a]'s distance);
+              //                                            aux & kMayLackMaterial: R[b] may carry no material
+    Move,     // R[dst] = R[a]
+    Negate,  // R[dst] = −R[a]
+    Empty,   // R[dst] = kEmpty, no material
     // Only in pruned code, where R[b] won a Combine by distance but what R[a] was made of still shows through:
-    Take,            // R[dst] = R[b] (aux 0) or −R[b] (aux 1); material: R[b]'s, or R[a]'s where R[b] has none
-    Constant,        // R[dst] = 0 with the material (edit) of the Shape at param: only its material is looked at
+    Take,      // R[dst] = R[b] (aux 0) or −R[b] (aux 1); material: R[b]'s, or R[a]'s where R[b] has none
+    Constant,  // R[dst] = 0 with the material (edit) of the Shape at param: only its material is looked at
 };
 inline constexpr uint32_t kMayLackMaterial = 4;
 
@@ -73,18 +73,19 @@ static_assert(sizeof(Instruction) == 8);
 struct EditSpan {
     uint32_t first = 0, count = 0;  ///< its instructions, the world Combine last
     Box3 bounds;                    ///< of its solid, world metres; infinite faces for unbounded edits
-    float reach = 0;                ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
+    float reach =
+        0;  ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
     Op op = Op::Union;
 };
 
 struct Program {
     std::vector<Instruction> code;  ///< [Empty R0] [edit 0] [edit 1] …; the result is R0
     std::vector<float> params;
-    std::vector<float> samples;     ///< numbers of sampled shapes
-    std::vector<EditSpan> edits;    ///< same order as given; hidden edits have count 0 and empty bounds
-    Box3 bounds;                    ///< what the finite edits can change: solids of unions, and of the others where something is
-                                    ///< unbounded; empty when none
-    bool unbounded = false;         ///< some visible union edit has infinite bounds
+    std::vector<float> samples;   ///< numbers of sampled shapes
+    std::vector<EditSpan> edits;  ///< same order as given; hidden edits have count 0 and empty bounds
+    Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
+                  ///< unbounded; empty when none
+    bool unbounded = false;  ///< some visible union edit has infinite bounds
 };
 
 /// Grid of a heightfield, row by row in z, values in [0, 1].
@@ -96,8 +97,8 @@ struct HeightGrid {
 /// What compile() reads.
 struct Source {
     std::span<const Edit> edits;
-    std::span<const Object> objects;                     ///< ObjectId::index refers here
-    std::span<const HeightGrid> grids;                   ///< Shape::data of a sampled shape is the decimal index of its grid
+    std::span<const Object> objects;    ///< ObjectId::index refers here
+    std::span<const HeightGrid> grids;  ///< Shape::data of a sampled shape is the decimal index of its grid
 };
 
 /// Where compile() found a fault.
@@ -105,13 +106,12 @@ struct Fault {
     uint32_t edit = UINT32_MAX;    ///< the edit it came through
     uint32_t object = UINT32_MAX;  ///< the object the node is in; UINT32_MAX: the edit's own node
     uint32_t node = 0;
-    int warp = -1;                 ///< entry of the node's domain, -1: none
+    int warp = -1;  ///< entry of the node's domain, -1: none
 };
 
 /// Compiles all edits. Fails on references to nothing, cycles, a repeat whose child does not fit its spacing, warps that need a
 /// bounded child, bends past their limit, and trees that expand to more than 2^22 leaves. `fault`, if given, says where.
 /// Parameter ranges are not checked here (see out_of_range). Any thread.
 Result<Program> compile(const Source& source, Fault* fault = nullptr);
-
 
 }  // namespace kiln::sdf

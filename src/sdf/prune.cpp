@@ -98,67 +98,68 @@ float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruc
         const Need wanted = need[dst];
         if (wanted == Need::None) continue;
         switch (op) {
-            case Opcode::Shape:
-                need[dst] = Need::None;
-                if (wanted == Need::Material) {
-                    kept.push_back(Instruction::make(Opcode::Constant, 0, dst, 0, 0, in.param));
-                } else {
-                    kept.push_back(in);
-                    need_point = true;
-                }
-                break;
-            case Opcode::Value:
-            case Opcode::Bound:
-                if (wanted == Need::Value) {
-                    kept.push_back(in);
-                    need_point = true;
-                }
-                break;
-            case Opcode::Empty:
-            case Opcode::Constant:
-                need[dst] = Need::None;
+        case Opcode::Shape:
+            need[dst] = Need::None;
+            if (wanted == Need::Material) {
+                kept.push_back(Instruction::make(Opcode::Constant, 0, dst, 0, 0, in.param));
+            } else {
                 kept.push_back(in);
-                break;
-            case Opcode::Move:
-            case Opcode::Negate:
-                need[dst] = Need::None;
-                raise(in.a(), wanted);
-                if (op == Opcode::Negate || in.a() != dst) kept.push_back(in);
-                break;
-            case Opcode::Take:
-                need[dst] = Need::None;
-                raise(in.a(), Need::Material);
-                raise(in.b(), wanted);
-                kept.push_back(in);
-                break;
-            case Opcode::Combine: {
-                const uint32_t kind = in.aux() & 3u;
-                const float* w = tape.params + in.param;
-                const bool right_may_lack = (in.aux() & kMayLackMaterial) != 0;
-                const Winner winner = decide(kind, scratch.left[pc], scratch.right[pc], std::max(w[0], w[1]), ball);
-                need[dst] = Need::None;
-                if (winner == Winner::Left) {
-                    raise(in.a(), wanted);
-                    if (in.a() != dst) kept.push_back(Instruction::make(Opcode::Move, 0, dst, in.a(), 0, 0));
-                } else if (winner == Winner::Right) {
-                    const bool negate = kind == uint32_t(Op::Subtract);
-                    raise(in.b(), wanted);
-                    if (right_may_lack) {
-                        raise(in.a(), Need::Material);
-                        kept.push_back(Instruction::make(Opcode::Take, negate ? 1u : 0u, dst, in.a(), in.b(), 0));
-                    } else if (negate) {
-                        kept.push_back(Instruction::make(Opcode::Negate, 0, dst, in.b(), 0, 0));
-                    } else if (in.b() != dst) {
-                        kept.push_back(Instruction::make(Opcode::Move, 0, dst, in.b(), 0, 0));
-                    }
-                } else {
-                    raise(in.a(), Need::Value);
-                    raise(in.b(), Need::Value);
-                    kept.push_back(in);
-                }
-                break;
+                need_point = true;
             }
-            default: break;
+            break;
+        case Opcode::Value:
+        case Opcode::Bound:
+            if (wanted == Need::Value) {
+                kept.push_back(in);
+                need_point = true;
+            }
+            break;
+        case Opcode::Empty:
+        case Opcode::Constant:
+            need[dst] = Need::None;
+            kept.push_back(in);
+            break;
+        case Opcode::Move:
+        case Opcode::Negate:
+            need[dst] = Need::None;
+            raise(in.a(), wanted);
+            if (op == Opcode::Negate || in.a() != dst) kept.push_back(in);
+            break;
+        case Opcode::Take:
+            need[dst] = Need::None;
+            raise(in.a(), Need::Material);
+            raise(in.b(), wanted);
+            kept.push_back(in);
+            break;
+        case Opcode::Combine: {
+            const uint32_t kind = in.aux() & 3u;
+            const float* w = tape.params + in.param;
+            const bool right_may_lack = (in.aux() & kMayLackMaterial) != 0;
+            const Winner winner = decide(kind, scratch.left[pc], scratch.right[pc], std::max(w[0], w[1]), ball);
+            need[dst] = Need::None;
+            if (winner == Winner::Left) {
+                raise(in.a(), wanted);
+                if (in.a() != dst) kept.push_back(Instruction::make(Opcode::Move, 0, dst, in.a(), 0, 0));
+            } else if (winner == Winner::Right) {
+                const bool negate = kind == uint32_t(Op::Subtract);
+                raise(in.b(), wanted);
+                if (right_may_lack) {
+                    raise(in.a(), Need::Material);
+                    kept.push_back(Instruction::make(Opcode::Take, negate ? 1u : 0u, dst, in.a(), in.b(), 0));
+                } else if (negate) {
+                    kept.push_back(Instruction::make(Opcode::Negate, 0, dst, in.b(), 0, 0));
+                } else if (in.b() != dst) {
+                    kept.push_back(Instruction::make(Opcode::Move, 0, dst, in.b(), 0, 0));
+                }
+            } else {
+                raise(in.a(), Need::Value);
+                raise(in.b(), Need::Value);
+                kept.push_back(in);
+            }
+            break;
+        }
+        default:
+            break;
         }
     }
     out.assign(kept.rbegin(), kept.rend());

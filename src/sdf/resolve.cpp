@@ -45,7 +45,8 @@ const char* repeat_fault(const Warp& warp, const Box3& child) {
     for (size_t axis = 0; axis < 3; ++axis) {
         const float spacing = warp.params[axis];
         if (spacing <= 0 || warp.params[3 + axis] == 1) continue;
-        if (!(size[axis] <= spacing * 1.0001f)) return "the repeated shape is wider than the spacing; use a larger spacing or a smaller shape";
+        if (!(size[axis] <= spacing * 1.0001f))
+            return "the repeated shape is wider than the spacing; use a larger spacing or a smaller shape";
     }
     return nullptr;
 }
@@ -91,14 +92,16 @@ public:
             where_ = {};
             where_.edit = e;
             const Node& node = s.edits[e].node;
-            if (node.kind == Node::Kind::Fold) return fail(fault_, where_, "an edit has no children of its own; name an object");
+            if (node.kind == Node::Kind::Fold)
+                return fail(fault_, where_, "an edit has no children of its own; name an object");
             if (auto r = visit_object_of(node); !r) return r;
             where_.object = UINT32_MAX;
             where_.node = 0;
             if (auto r = bound_node(node, nullptr, out_.edit_bounds[e]); !r) return r;
             leaves += out_.edit_bounds[e].leaves;
             if (leaves > kMaxLeaves) {
-                return fail(fault_, where_, "the edits up to here expand to more than 4194304 primitives; use fewer copies");
+                return fail(fault_, where_,
+                            "the edits up to here expand to more than 4194304 primitives; use fewer copies");
             }
         }
         return {};
@@ -141,7 +144,8 @@ private:
             if (object >= count || out_.object(object).nodes.empty()) {
                 return fail(fault_, where_, "refers to an object that does not exist");
             }
-            if (state_[object] == State::Open) return fail(fault_, where_, "object contains itself: " + cycle(stack, object));
+            if (state_[object] == State::Open)
+                return fail(fault_, where_, "object contains itself: " + cycle(stack, object));
             if (state_[object] == State::Unseen) {
                 state_[object] = State::Open;
                 stack.push_back({object, 0});
@@ -194,7 +198,8 @@ private:
         for (uint32_t n = uint32_t(object.nodes.size()); n-- > 0;) {
             where_.node = n;
             for (uint32_t child : object.nodes[n].children) {
-                if (child <= n || child >= object.nodes.size()) return fail(fault_, where_, "a child must come after its parent");
+                if (child <= n || child >= object.nodes.size())
+                    return fail(fault_, where_, "a child must come after its parent");
             }
             if (auto r = bound_node(object.nodes[n], &bounds, bounds[n]); !r) return r;
         }
@@ -217,7 +222,8 @@ private:
         uint64_t leaves = 1;
         if (node.kind == Node::Kind::Fold) {
             if (node.children.empty()) return fail(fault_, where_, "a node with `op` needs at least one child");
-            if (node.op == Op::Paint) return fail(fault_, where_, "paint is not an operation of trees; use union, subtract or intersect");
+            if (node.op == Op::Paint)
+                return fail(fault_, where_, "paint is not an operation of trees; use union, subtract or intersect");
             box = fold_bounds(node, *nodes);
             leaves = 0;
             for (uint32_t child : node.children) leaves += (*nodes)[child].leaves;
@@ -249,7 +255,8 @@ private:
             leaves = std::min(leaves, uint64_t(1) << 40);
         }
         where_.warp = -1;
-        if (leaves > kMaxLeaves) return fail(fault_, where_, "expands to more than 4194304 primitives; use fewer copies");
+        if (leaves > kMaxLeaves)
+            return fail(fault_, where_, "expands to more than 4194304 primitives; use fewer copies");
         out.leaves = leaves;
         out.parent = transformed_box(box, node.transform);
         return {};

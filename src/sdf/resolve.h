@@ -14,7 +14,7 @@ namespace kiln::sdf {
 struct NodeBounds {
     std::vector<Box3> stages;  ///< [0] content, [i + 1] after domain[i]
     Box3 parent;
-    uint64_t leaves = 1;       ///< primitives it expands to, copies counted
+    uint64_t leaves = 1;  ///< primitives it expands to, copies counted
 };
 
 /// Most primitives one world may expand to: what 22 value registers can serve (Sethi–Ullman: log2 + 1).
@@ -22,13 +22,13 @@ inline constexpr uint64_t kMaxLeaves = uint64_t(1) << 22;
 
 struct Resolved {
     Source source;
-    std::vector<Object> composites;                     ///< objects of composite shapes, numbered after source.objects
-    std::vector<std::vector<NodeBounds>> object_bounds; ///< by object, by node
-    std::vector<NodeBounds> edit_bounds;                ///< by edit; empty stages for hidden edits
+    std::vector<Object> composites;                      ///< objects of composite shapes, numbered after source.objects
+    std::vector<std::vector<NodeBounds>> object_bounds;  ///< by object, by node
+    std::vector<NodeBounds> edit_bounds;                 ///< by edit; empty stages for hidden edits
 
-    std::vector<float> samples;                         ///< all grids, one after another
-    std::vector<uint32_t> grid_first;                   ///< where each grid begins in `samples`
-    std::vector<vec2> grid_steps;                       ///< its largest difference between neighbours, along x and along z
+    std::vector<float> samples;        ///< all grids, one after another
+    std::vector<uint32_t> grid_first;  ///< where each grid begins in `samples`
+    std::vector<vec2> grid_steps;      ///< its largest difference between neighbours, along x and along z
 
     /// A shape's numbers with the internal fields of sampled shapes filled in.
     std::array<float, kMaxParams> params_of(const Shape& shape) const;

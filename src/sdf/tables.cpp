@@ -37,7 +37,8 @@ std::optional<std::string_view> out_of_range(const FieldRow& field, float value)
     if (!std::isfinite(value)) return "must be a finite number";
     if (range == "any" || range == "internal") return std::nullopt;
     if (range == "axis") {
-        return value == 0 || value == 1 || value == 2 ? std::nullopt : std::optional<std::string_view>("must be x, y or z");
+        return value == 0 || value == 1 || value == 2 ? std::nullopt
+                                                      : std::optional<std::string_view>("must be x, y or z");
     }
     if (range == "> 0") return value > 0 ? std::nullopt : std::optional<std::string_view>("must be greater than 0");
     if (range == ">= 0") return value >= 0 ? std::nullopt : std::optional<std::string_view>("must not be negative");

@@ -14,19 +14,24 @@ namespace kiln::sdf {
 /// One field of a parameter struct.
 struct FieldRow {
     std::string_view name;
-    int arity = 0;                    ///< 1, 2 or 3 numbers; 0 ends the list
-    int offset = 0;                   ///< of the first number in Shape::params
+    int arity = 0;   ///< 1, 2 or 3 numbers; 0 ends the list
+    int offset = 0;  ///< of the first number in Shape::params
     std::array<float, 3> defaults{};
-    std::string_view unit;            ///< "m", "rad", "1/m", "rad/m", "1"
-    std::string_view range;           ///< "any", "> 0", ">= 0", "[a, b]", "(a, b]", "integer [a, b]", "axis", "internal"
+    std::string_view unit;   ///< "m", "rad", "1/m", "rad/m", "1"
+    std::string_view range;  ///< "any", "> 0", ">= 0", "[a, b]", "(a, b]", "integer [a, b]", "axis", "internal"
     std::string_view doc;
 };
 
 /// One shape or warp.
 struct KindRow {
     enum How : uint8_t {
-        Exact, Bound, Sampled, Composite,  // shapes: true distance outside; lower bound; also reads samples; a library object
-        Point, Value, Copies,              // warps: moves the point; changes the distance; several copies
+        Exact,
+        Bound,
+        Sampled,
+        Composite,  // shapes: true distance outside; lower bound; also reads samples; a library object
+        Point,
+        Value,
+        Copies,  // warps: moves the point; changes the distance; several copies
     };
     std::string_view name;
     How how;

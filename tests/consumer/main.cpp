@@ -25,6 +25,7 @@ int main() {
     // Beside the hole the ball alone answers; straight above, the bottom of the hole at y = 0.5 is what a ray meets.
     const float beside = world.distance({2, 0, 0});
     const kiln::RayHit hit = world.cast({.origin = {0, 3, 0}, .direction = {0, -1, 0}});
-    std::printf("kiln %s: distance %.4f, ray %.4f\n", std::string(kiln::version()).c_str(), double(beside), double(hit.t));
+    std::printf("kiln %s: distance %.4f, ray %.4f\n", std::string(kiln::version()).c_str(), double(beside),
+                double(hit.t));
     return std::abs(beside - 1) < 1e-5f && hit.hit && std::abs(hit.t - 2.5f) < 1e-3f ? 0 : 1;
 }

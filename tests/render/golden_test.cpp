@@ -26,7 +26,8 @@ struct GoldenGpu : testing::Test {
         if (golden_accepted(name)) {
             std::string change = "(none) -> new";
             if (std::filesystem::exists(golden)) {
-                change = "old -> new: FLIP " + std::to_string(rhi::must(image::compare_files(golden.string(), made.string())).flip);
+                change = "old -> new: FLIP " +
+                         std::to_string(rhi::must(image::compare_files(golden.string(), made.string())).flip);
             }
             std::filesystem::create_directories(golden.parent_path());
             std::filesystem::copy_file(made, golden, std::filesystem::copy_options::overwrite_existing);

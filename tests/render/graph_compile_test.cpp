@@ -34,9 +34,8 @@ void expect_golden(const std::string& name, const std::string& text) {
         std::ofstream(path) << text;
         return golden_renewed(name, "old -> new:\n" + golden.str() + "->\n" + text);
     }
-    EXPECT_EQ(text, golden.str())
-        << "the plan is another one. If it should be, remake it and read the difference:\n"
-        << "  ./test --accept " << name << " && git diff tests/golden/plans";
+    EXPECT_EQ(text, golden.str()) << "the plan is another one. If it should be, remake it and read the difference:\n"
+                                  << "  ./test --accept " << name << " && git diff tests/golden/plans";
 }
 
 const rhi::TextureHandle kAtlas{1, 1};

@@ -37,9 +37,12 @@ public:
     }
     Shape shape() {
         switch (below(3)) {
-            case 0: return Sphere{.radius = in(0.1f, 0.5f)};
-            case 1: return Box{.half_extents = {in(0.1f, 0.5f), in(0.1f, 0.5f), in(0.1f, 0.5f)}};
-            default: return Torus{.major_radius = in(0.2f, 0.5f), .minor_radius = in(0.05f, 0.15f)};
+        case 0:
+            return Sphere{.radius = in(0.1f, 0.5f)};
+        case 1:
+            return Box{.half_extents = {in(0.1f, 0.5f), in(0.1f, 0.5f), in(0.1f, 0.5f)}};
+        default:
+            return Torus{.major_radius = in(0.2f, 0.5f), .minor_radius = in(0.05f, 0.15f)};
         }
     }
     std::vector<Warp> domain() {
@@ -150,7 +153,8 @@ TEST(Program, WorldDistanceIsOneLipschitz) {
             const double gap = std::sqrt(double(dot(p - q, p - q)));
             const double a = evaluate(view(*program), dvec3{p.x, p.y, p.z});
             const double b = evaluate(view(*program), dvec3{q.x, q.y, q.z});
-            EXPECT_LE(std::abs(a - b), gap * (1 + 1e-5) + 1e-6) << "seed " << seed << " at " << p.x << ' ' << p.y << ' ' << p.z;
+            EXPECT_LE(std::abs(a - b), gap * (1 + 1e-5) + 1e-6)
+                << "seed " << seed << " at " << p.x << ' ' << p.y << ' ' << p.z;
         }
     }
 }
@@ -170,7 +174,8 @@ TEST(Program, EveryInstructionSetGivesTheSameBytes) {
         for (Isa isa : {Isa::Sse4, Isa::Avx2, Isa::Avx512}) {
             if (!has_isa(isa)) continue;
             evaluate(view(*program), cloud.points(), other.data(), isa);
-            EXPECT_EQ(std::memcmp(one.data(), other.data(), 4 * one.size()), 0) << "isa " << int(isa) << " seed " << seed;
+            EXPECT_EQ(std::memcmp(one.data(), other.data(), 4 * one.size()), 0)
+                << "isa " << int(isa) << " seed " << seed;
             evaluate_materials(view(*program), cloud.points(), other.data(), other_mix.data(), false, isa);
             for (size_t i = 0; i < one.size(); ++i) {
                 ASSERT_EQ(one_mix[i].id0, other_mix[i].id0);
@@ -251,7 +256,8 @@ TEST(Program, RepeatIsTheNearestOfAllCopiesAlsoOffCentreAndTurned) {
             for (int z = -2; z <= 2; ++z) {
                 const double d = evaluate(view(*single), dvec3{p.x - 0.8f * float(x), p.y, p.z - 0.8f * float(z)});
                 nearest = std::min(nearest, d);
-                if (std::abs(p.x - 0.3f - 0.8f * float(x)) <= 0.4f && std::abs(p.z + 0.2f - 0.8f * float(z)) <= 0.4f) own = d;
+                if (std::abs(p.x - 0.3f - 0.8f * float(x)) <= 0.4f && std::abs(p.z + 0.2f - 0.8f * float(z)) <= 0.4f)
+                    own = d;
             }
         }
         other_copy += own < 1e29 && nearest < own - 1e-3;
@@ -278,7 +284,8 @@ TEST(Program, AWarpedSolidIsTheImageOfTheBareOne) {
     for (int i = 0; i < 2000; ++i) {
         const vec3 bare{r.in(-0.8f, 0.8f), r.in(-1.5f, 1.5f), r.in(-0.3f, 0.3f)};
         const vec3 p = rotate(axis_angle({0, 1, 0}, 2 * bare.y), bare);  // right-handed about +Y
-        const vec3 outside = max(vec3{std::abs(bare.x), std::abs(bare.y), std::abs(bare.z)} - vec3{0.4f, 1, 0.1f}, {-1, -1, -1});
+        const vec3 outside =
+            max(vec3{std::abs(bare.x), std::abs(bare.y), std::abs(bare.z)} - vec3{0.4f, 1, 0.1f}, {-1, -1, -1});
         const float signed_max = std::max({outside.x, outside.y, outside.z});
         const double d = evaluate(view(*program), dvec3{p.x, p.y, p.z});
         EXPECT_EQ(d > 0, signed_max > 0) << bare.x << ' ' << bare.y << ' ' << bare.z;

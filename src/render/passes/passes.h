@@ -14,7 +14,8 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons, kLight, kTonemap, kView;
+extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons, kLight,
+    kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
@@ -41,7 +42,7 @@ struct TileInputs {
     rhi::Extent size;       // of the tile
     bool exact = false;     // some code is marched: analytic, or edits leave the grid
     bool analytic = false;  // … instead of the bricks
-    bool horizons = false;   // exact code is half-spaces outside the grid, no more
+    bool horizons = false;  // exact code is half-spaces outside the grid, no more
     TapeUse use;
 };
 

@@ -15,7 +15,7 @@ struct Use {
     TextureHandle texture;
     Subresources range;  // counts resolved
     Access access = Access::Undefined;
-    Origin at = {};   // of a copy into a texture: the texels it writes; size (0, 0, 0): not said
+    Origin at = {};  // of a copy into a texture: the texels it writes; size (0, 0, 0): not said
     Extent size = {0, 0, 0};
 };
 

@@ -55,7 +55,9 @@ KILN_SDF real select(mask m, real a, real b) { return m.v ? a.v : b.v; }
 KILN_SDF real min(real a, real b) { return lane_f(_mm512_maskz_min_ps(0xffff, __m512(b.v), __m512(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm512_maskz_max_ps(0xffff, __m512(b.v), __m512(a.v))); }
 KILN_SDF real sqrt(real a) { return lane_f(_mm512_maskz_sqrt_ps(0xffff, __m512(a.v))); }
-KILN_SDF real floor(real a) { return lane_f(_mm512_maskz_roundscale_ps(0xffff, __m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC)); }
+KILN_SDF real floor(real a) {
+    return lane_f(_mm512_maskz_roundscale_ps(0xffff, __m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC));
+}
 KILN_SDF whole whole_of(real a) { return lane_u(_mm512_maskz_cvttps_epi32(0xffff, __m512(a.v))); }
 #elif KILN_LANES == 8
 KILN_SDF real min(real a, real b) { return lane_f(_mm256_min_ps(__m256(b.v), __m256(a.v))); }
@@ -109,31 +111,31 @@ struct real3 {
     real3(param3 p) : x(p.x), y(p.y), z(p.z) {}
 };
 
-#define KILN_VECTOR_TEXT(V2, V3, S)                                                                         \
-    KILN_SDF V2 operator+(V2 a, V2 b) { return V2(a.x + b.x, a.y + b.y); }                                   \
-    KILN_SDF V2 operator-(V2 a, V2 b) { return V2(a.x - b.x, a.y - b.y); }                                   \
-    KILN_SDF V2 operator*(V2 a, V2 b) { return V2(a.x * b.x, a.y * b.y); }                                   \
-    KILN_SDF V2 operator*(V2 a, S s) { return V2(a.x * s, a.y * s); }                                        \
-    KILN_SDF V2 operator*(S s, V2 a) { return a * s; }                                                       \
-    KILN_SDF V2 operator/(V2 a, S s) { return V2(a.x / s, a.y / s); }                                        \
-    KILN_SDF V2 operator-(V2 a) { return V2(-a.x, -a.y); }                                                   \
-    KILN_SDF V3 operator+(V3 a, V3 b) { return V3(a.x + b.x, a.y + b.y, a.z + b.z); }                        \
-    KILN_SDF V3 operator-(V3 a, V3 b) { return V3(a.x - b.x, a.y - b.y, a.z - b.z); }                        \
-    KILN_SDF V3 operator*(V3 a, V3 b) { return V3(a.x * b.x, a.y * b.y, a.z * b.z); }                        \
-    KILN_SDF V3 operator*(V3 a, S s) { return V3(a.x * s, a.y * s, a.z * s); }                               \
-    KILN_SDF V3 operator*(S s, V3 a) { return a * s; }                                                       \
-    KILN_SDF V3 operator/(V3 a, S s) { return V3(a.x / s, a.y / s, a.z / s); }                               \
-    KILN_SDF V3 operator/(V3 a, V3 b) { return V3(a.x / b.x, a.y / b.y, a.z / b.z); }                        \
-    KILN_SDF V3 operator-(V3 a) { return V3(-a.x, -a.y, -a.z); }                                             \
-    KILN_SDF V3 min(V3 a, V3 b) { return V3(min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)); }                  \
-    KILN_SDF V3 max(V3 a, V3 b) { return V3(max(a.x, b.x), max(a.y, b.y), max(a.z, b.z)); }                  \
-    KILN_SDF V3 clamp(V3 x, V3 lo, V3 hi) { return min(max(x, lo), hi); }                                    \
-    KILN_SDF V2 abs(V2 a) { return V2(abs(a.x), abs(a.y)); }                                                 \
-    KILN_SDF V3 abs(V3 a) { return V3(abs(a.x), abs(a.y), abs(a.z)); }                                       \
-    KILN_SDF V3 floor(V3 a) { return V3(floor(a.x), floor(a.y), floor(a.z)); }                               \
-    KILN_SDF S dot(V2 a, V2 b) { return a.x * b.x + a.y * b.y; }                                             \
-    KILN_SDF S dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }                                 \
-    KILN_SDF S length(V2 a) { return sqrt(dot(a, a)); }                                                      \
+#define KILN_VECTOR_TEXT(V2, V3, S)                                                         \
+    KILN_SDF V2 operator+(V2 a, V2 b) { return V2(a.x + b.x, a.y + b.y); }                  \
+    KILN_SDF V2 operator-(V2 a, V2 b) { return V2(a.x - b.x, a.y - b.y); }                  \
+    KILN_SDF V2 operator*(V2 a, V2 b) { return V2(a.x * b.x, a.y * b.y); }                  \
+    KILN_SDF V2 operator*(V2 a, S s) { return V2(a.x * s, a.y * s); }                       \
+    KILN_SDF V2 operator*(S s, V2 a) { return a * s; }                                      \
+    KILN_SDF V2 operator/(V2 a, S s) { return V2(a.x / s, a.y / s); }                       \
+    KILN_SDF V2 operator-(V2 a) { return V2(-a.x, -a.y); }                                  \
+    KILN_SDF V3 operator+(V3 a, V3 b) { return V3(a.x + b.x, a.y + b.y, a.z + b.z); }       \
+    KILN_SDF V3 operator-(V3 a, V3 b) { return V3(a.x - b.x, a.y - b.y, a.z - b.z); }       \
+    KILN_SDF V3 operator*(V3 a, V3 b) { return V3(a.x * b.x, a.y * b.y, a.z * b.z); }       \
+    KILN_SDF V3 operator*(V3 a, S s) { return V3(a.x * s, a.y * s, a.z * s); }              \
+    KILN_SDF V3 operator*(S s, V3 a) { return a * s; }                                      \
+    KILN_SDF V3 operator/(V3 a, S s) { return V3(a.x / s, a.y / s, a.z / s); }              \
+    KILN_SDF V3 operator/(V3 a, V3 b) { return V3(a.x / b.x, a.y / b.y, a.z / b.z); }       \
+    KILN_SDF V3 operator-(V3 a) { return V3(-a.x, -a.y, -a.z); }                            \
+    KILN_SDF V3 min(V3 a, V3 b) { return V3(min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)); } \
+    KILN_SDF V3 max(V3 a, V3 b) { return V3(max(a.x, b.x), max(a.y, b.y), max(a.z, b.z)); } \
+    KILN_SDF V3 clamp(V3 x, V3 lo, V3 hi) { return min(max(x, lo), hi); }                   \
+    KILN_SDF V2 abs(V2 a) { return V2(abs(a.x), abs(a.y)); }                                \
+    KILN_SDF V3 abs(V3 a) { return V3(abs(a.x), abs(a.y), abs(a.z)); }                      \
+    KILN_SDF V3 floor(V3 a) { return V3(floor(a.x), floor(a.y), floor(a.z)); }              \
+    KILN_SDF S dot(V2 a, V2 b) { return a.x * b.x + a.y * b.y; }                            \
+    KILN_SDF S dot(V3 a, V3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }                \
+    KILN_SDF S length(V2 a) { return sqrt(dot(a, a)); }                                     \
     KILN_SDF S length(V3 a) { return sqrt(dot(a, a)); }
 KILN_VECTOR_TEXT(param2, param3, param)
 KILN_VECTOR_TEXT(real2, real3, real)
