@@ -122,6 +122,7 @@ void main() {
         float h = frame.grid.voxel_size;
         // One voxel off the surface; a pixel, where pixels are larger than voxels.
         float off = max(1.0, 1.5 * frame.pixel_angle * t);
+        if (state != kSeenOutside) off = min(off, 2.0);  // what bricks hold is exact to a voxel: farther would leave small hollows
         vec3 from = ray.part + ray.direction * t + surface.normal * off;
         shadow_whole = ray.whole + ivec3(floor(from));
         vec3 p = from - floor(from);
