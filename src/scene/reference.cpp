@@ -14,6 +14,23 @@
 #include <chrono>
 
 namespace kiln {
+namespace {
+
+// What the surface is made of, as resolve blends it: every number by the second's share.
+Material blend(const std::vector<Material>& materials, const sdf::MaterialMix& mix) {
+    if (mix.id0 >= materials.size()) return materials.front();
+    Material out = materials[mix.id0];
+    if (mix.weight <= 0 || mix.id1 >= materials.size()) return out;
+    const Material& other = materials[mix.id1];
+    const auto mixed = [&](auto a, auto b) { return a * (1 - mix.weight) + b * mix.weight; };
+    out.base_color = mixed(out.base_color, other.base_color);
+    out.emissive = mixed(out.emissive, other.emissive);
+    out.roughness = mixed(out.roughness, other.roughness);
+    out.metallic = mixed(out.metallic, other.metallic);
+    return out;
+}
+
+}  // namespace
 
 Result<Picture> render_reference(const Frame& frame, const RenderSettings& settings, int samples, RenderStats* stats) {
     if (samples < 1) return Error{"render_reference: samples must be 1 or more", ErrorKind::Usage};
@@ -27,8 +44,9 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     render::ReferenceField field;
     field.distance = [&](dvec3 p) { return exact.distance(p); };
     field.material = [&](dvec3 p) {
-        const MaterialId id = exact.sample({float(p.x), float(p.y), float(p.z)}).material;
-        return frame.materials[sdf::material_number(id)];
+        sdf::MaterialMix mix;
+        (void)sdf::evaluate(sdf::view(program), p, &mix);
+        return blend(frame.materials, mix);
     };
     field.bounds = program.bounds;
     if (program.unbounded) {
