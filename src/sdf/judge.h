@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// The judge: the ordered list evaluated by walking its trees in double precision, node by node as the scene says, with nothing
-// shared with the tape compiler but the shape texts. No culling, no tape, no float. Slow; for tests and for exact answers.
+// The judge: the ordered list evaluated by walking its trees in double precision, node by node as the scene says. It shares the shape
+// texts and resolve.h (references, bounds, Lipschitz factors) with the tape compiler; no tape, no culling, no float. Slow; for tests.
 #pragma once
 
 #include "sdf/program.h"
