@@ -4,6 +4,7 @@
 #include "sdf/bounds.h"
 
 #include "sdf/eval_isa.h"
+#include "sdf/tables.h"
 
 #include <limits>
 
@@ -32,8 +33,13 @@ Box3 from_host(const host::Bounds& b) { return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.
 
 Box3 shape_bounds(const Shape& shape) { return from_host(host::shape_bounds(shape.kind, shape.params.data())); }
 
-Box3 warp_bounds(const Warp& warp, const Box3& child) {
-    return from_host(host::warp_bounds(warp.kind, warp.params.data(), to_host(child)));
+Box3 warp_bounds(const Warp& warp, const Box3& child, float rate) {
+    const Box3 out = from_host(host::warp_bounds(warp.kind, warp.params.data(), to_host(child)));
+    if (warp_rows()[warp.kind].how != KindRow::Value || rate == 1.0f) return out;
+    // The texts say how far the surface moves where the value is a distance; where it grows slower it moves farther.
+    const auto farther = [&](float from, float to) { return std::isfinite(from) ? from + (to - from) / rate : from; };
+    return {{farther(child.min.x, out.min.x), farther(child.min.y, out.min.y), farther(child.min.z, out.min.z)},
+            {farther(child.max.x, out.max.x), farther(child.max.y, out.max.y), farther(child.max.z, out.max.z)}};
 }
 
 float warp_lipschitz(const Warp& warp, const Box3& region) {
@@ -65,6 +71,10 @@ Box3 transformed_box(const Box3& box, const Transform& transform) {
 
 float smallest_scale(const Transform& transform) {
     return std::min({transform.scale.x, transform.scale.y, transform.scale.z});
+}
+
+float largest_scale(const Transform& transform) {
+    return std::max({transform.scale.x, transform.scale.y, transform.scale.z});
 }
 
 }  // namespace kiln::sdf

@@ -9,8 +9,8 @@ namespace kiln::sdf {
 
 /// Solid of a primitive in its own frame.
 Box3 shape_bounds(const Shape& shape);
-/// Solid after one domain entry, given the solid before it.
-Box3 warp_bounds(const Warp& warp, const Box3& child);
+/// Solid after one domain entry, given the solid before it, outside whose box the value is at least rate · distance to the box.
+Box3 warp_bounds(const Warp& warp, const Box3& child, float rate);
 /// Largest stretch of the entry over `region` (a box in the space after the entry): the child's value divided by this is 1-Lipschitz
 /// there. Infinite where the entry has no bound on such a region.
 float warp_lipschitz(const Warp& warp, const Box3& region);
@@ -18,5 +18,6 @@ float warp_lipschitz(const Warp& warp, const Box3& region);
 Box3 transformed_box(const Box3& box, const Transform& transform);
 /// Smallest scale factor: what a local distance is multiplied by to stay a lower bound.
 float smallest_scale(const Transform& transform);
+float largest_scale(const Transform& transform);
 
 }  // namespace kiln::sdf

@@ -130,6 +130,7 @@ public:
             out_.code.push_back(Instruction::make(Opcode::Combine, uint32_t(edit.op) | flag, 0, 0, 1, at));
             span.count = uint32_t(out_.code.size()) - span.first;
             span.bounds = resolved_.edit_bounds[e].parent;
+            span.rate = resolved_.edit_bounds[e].rate;
             span.reach = std::max(k, k_material);
             if (edit.op == Op::Union) {
                 if (span.bounds.finite()) {
@@ -223,7 +224,7 @@ private:
                 return;
             }
             const EntryFactor factor = entry_factor(warp, solid);
-            if (factor.lipschitz > 1.0f && factor.bounded) {
+            if (factor.bounded) {
                 const uint32_t chain = flush(task.chain, task.pending);
                 add_bound(task, chain, solid, factor.margin);
                 if (how == KindRow::Point) {

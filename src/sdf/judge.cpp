@@ -148,7 +148,7 @@ double Judge::distance(dvec3 p_world) const {
                     continue;
                 }
                 const EntryFactor factor = entry_factor(warp, solid);
-                const bool bound = factor.lipschitz > 1.0f && factor.bounded;
+                const bool bound = factor.bounded;
                 if (f.step++ == 0) {
                     real3 p = f.p;
                     if (how == KindRow::Point) {

@@ -73,6 +73,8 @@ static_assert(sizeof(Instruction) == 8);
 struct EditSpan {
     uint32_t first = 0, count = 0;  ///< its instructions, the world Combine last
     Box3 bounds;                    ///< of its solid, world metres; infinite faces for unbounded edits
+    float rate =
+        1;  ///< (0, 1]: outside `bounds` its value, before the world Combine, is at least rate · distance(p, bounds)
     float reach =
         0;  ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
     Op op = Op::Union;

@@ -1,5 +1,15 @@
 // SPDX-License-Identifier: MIT
 // References are followed depth first with a stack of its own; bounds go from the leaves up.
+//
+// Bounds and rates. Every step keeps one promise: outside its box B a node's value v is at least rate · distance(p, B), 0 < rate <= 1.
+// So the solid lies in B, and a value's growth away from B is known where scales and Lipschitz factors have divided it.
+// - A primitive's value is at least the distance to its box: rate 1.
+// - Transform: a world length is at most (largest scale) times the local one, the value is multiplied by the smallest.
+// - A value entry moves the surface out by at most a where the child's value is a distance: v >= rate · distance(p, B) - a, which is
+//   rate · distance(p, B') for B' = B inflated by a / rate.
+// - An entry evaluated as a bounded leaf, and a copy of a repeat that is, are at least the distance to their box: rate 1.
+// - Mirror and elongate move each coordinate on its own, never nearer to B's interval than the point is to B's interval after them.
+// - Folds: see fold_bounds.
 
 #include "sdf/resolve.h"
 
@@ -15,6 +25,8 @@
 namespace kiln::sdf {
 namespace {
 
+constexpr float kSmallestRate = 1e-18f;
+
 bool is_copies(const Warp& warp) { return warp_rows()[warp.kind].how == KindRow::Copies; }
 
 Error fail(Fault* fault, const Fault& where, std::string message) {
@@ -22,21 +34,82 @@ Error fail(Fault* fault, const Fault& where, std::string message) {
     return Error{std::move(message), ErrorKind::Input};
 }
 
-Box3 fold_bounds(const Node& node, const std::vector<NodeBounds>& nodes) {
-    Box3 box = nodes[node.children[0]].parent;
-    for (size_t i = 1; i < node.children.size(); ++i) {
-        const Box3& next = nodes[node.children[i]].parent;
-        if (node.op == Op::Union) {
-            box = box_union(box, next);
-        } else if (node.op == Op::Intersect) {
-            // Disjoint boxes: the solid is empty, but later entries still need some finite box to be proven on.
-            const Box3 shared = box_intersection(box, next);
-            if (!shared.empty()) box = shared;
+// A box and how fast the value grows outside it, as NodeBounds::rate.
+struct Hull {
+    Box3 box;
+    float rate = 1;
+};
+
+// A smooth union of n values, none below x, is nowhere below x - k · bulge(n): with s = x - k u so far, the next is at worst x itself,
+// and smooth_min(s, x, k) = s - k (1 - u)² / 4. Rises towards 1 as 1 - 4 / n.
+float bulge(size_t n) {
+    float u = 0;
+    for (size_t i = 1; i < n; ++i) u += 0.25f * (1 - u) * (1 - u);
+    return u;
+}
+
+// Which child each face of an intersection's box is of, and what the faces together promise. A point outside the box is off it by d_i
+// along at most three axes, each beyond one face; children c with these faces have values v >= rate_c · |(d_i of c's faces)|, and
+// the intersection's is no less than any of them, so |d|² <= v² · sum over those children of 1 / rate_c².
+class Faces {
+public:
+    explicit Faces(const NodeBounds& first) : box_(first.parent) { rates_.push_back(first.rate); }
+
+    void intersect(const NodeBounds& next) {
+        const Box3 shared = box_intersection(box_, next.parent);
+        // Disjoint boxes: the solid is empty, but later entries still need some finite box to be proven on.
+        if (shared.empty()) return;
+        const vec3 &lo = shared.min, &hi = shared.max;
+        const bool moved[6] = {lo.x > box_.min.x, lo.y > box_.min.y, lo.z > box_.min.z,
+                               hi.x < box_.max.x, hi.y < box_.max.y, hi.z < box_.max.z};
+        for (size_t face = 0; face < 6; ++face) {
+            if (moved[face]) owner_[face] = rates_.size();
         }
+        rates_.push_back(next.rate);
+        box_ = shared;
     }
-    // smooth_min lies at most k/4 below min: a smooth union can bulge that far.
-    if (node.op == Op::Union && node.children.size() > 1) box = box.inflated(0.25f * node.blend_radius);
-    return box;
+
+    Hull hull() const {
+        const float faces[6] = {box_.min.x, box_.min.y, box_.min.z, box_.max.x, box_.max.y, box_.max.z};
+        double most = 1;
+        for (size_t corner = 0; corner < 8; ++corner) {
+            double sum = 0;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const auto side = [&](size_t a) { return a + 3 * (corner >> a & 1u); };
+                bool counted = !std::isfinite(faces[side(axis)]);  // nothing is beyond it
+                for (size_t a = 0; a < axis; ++a)
+                    counted = counted || (std::isfinite(faces[side(a)]) && owner_[side(a)] == owner_[side(axis)]);
+                const double rate = double(rates_[owner_[side(axis)]]);
+                if (!counted) sum += 1 / (rate * rate);
+            }
+            most = std::max(most, sum);
+        }
+        return {box_, float(1 / std::sqrt(most))};
+    }
+
+private:
+    Box3 box_;
+    std::vector<float> rates_;
+    std::array<size_t, 6> owner_{};  // of the faces -x -y -z +x +y +z, an index of rates_
+};
+
+// Union: a value >= rate · distance to its own box, hence to the common one, with the smallest rate. Subtract and intersect are no
+// less than their operands d and (d, e), blended or not.
+Hull fold_bounds(const Node& node, const std::vector<NodeBounds>& nodes) {
+    const NodeBounds& first = nodes[node.children[0]];
+    if (node.op == Op::Subtract) return {first.parent, first.rate};
+    if (node.op == Op::Intersect) {
+        Faces faces(first);
+        for (size_t i = 1; i < node.children.size(); ++i) faces.intersect(nodes[node.children[i]]);
+        return faces.hull();
+    }
+    Hull out{first.parent, first.rate};
+    for (size_t i = 1; i < node.children.size(); ++i) {
+        out.box = box_union(out.box, nodes[node.children[i]].parent);
+        out.rate = std::min(out.rate, nodes[node.children[i]].rate);
+    }
+    out.box = out.box.inflated(node.blend_radius * bulge(node.children.size()) / out.rate);
+    return out;
 }
 
 // A repeat needs its child's bounds to fit one spacing on every axis that it repeats.
@@ -218,17 +291,18 @@ private:
 
     Result<void> bound_node(const Node& node, const std::vector<NodeBounds>* nodes, NodeBounds& out) {
         where_.warp = -1;
-        Box3 box;
+        Hull hull;
+        Box3& box = hull.box;
         uint64_t leaves = 1;
         if (node.kind == Node::Kind::Fold) {
             if (node.children.empty()) return fail(fault_, where_, "a node with `op` needs at least one child");
             if (node.op == Op::Paint)
                 return fail(fault_, where_, "paint is not an operation of trees; use union, subtract or intersect");
-            box = fold_bounds(node, *nodes);
+            hull = fold_bounds(node, *nodes);
             leaves = 0;
             for (uint32_t child : node.children) leaves += (*nodes)[child].leaves;
         } else if (const uint32_t object = out_.object_of(node); object != UINT32_MAX) {
-            box = out_.object_bounds[object][0].parent;
+            hull = {out_.object_bounds[object][0].parent, out_.object_bounds[object][0].rate};
             leaves = out_.object_bounds[object][0].leaves;
         } else {
             if (shape_rows()[node.shape.kind].how == KindRow::Sampled && !has_grid(node.shape)) {
@@ -245,12 +319,15 @@ private:
                 if (const char* why = repeat_fault(warp, box)) return fail(fault_, where_, why);
                 leaves <<= repeat_axes(warp);
             }
-            box = warp_bounds(warp, box);
-            if (std::isinf(entry_factor(warp, box).lipschitz)) {
+            box = warp_bounds(warp, box, hull.rate);
+            const EntryFactor factor = entry_factor(warp, box);
+            if (std::isinf(factor.lipschitz)) {
                 return fail(fault_, where_,
                             box.finite() ? "bends this shape further than it can go; use a smaller value"
                                          : "needs a shape of finite size; use it on a bounded shape");
             }
+            hull.rate = factor.bounded ? 1 : hull.rate / factor.lipschitz;
+            if (is_copies(warp) && repeat_axes(warp) > 0) hull.rate = 1;
             out.stages.push_back(box);
             leaves = std::min(leaves, uint64_t(1) << 40);
         }
@@ -259,6 +336,13 @@ private:
             return fail(fault_, where_, "expands to more than 4194304 primitives; use fewer copies");
         out.leaves = leaves;
         out.parent = transformed_box(box, node.transform);
+        out.rate = hull.rate * smallest_scale(node.transform) / largest_scale(node.transform);
+        // No box promises anything of a value that is this much squeezed.
+        if (!(out.rate >= kSmallestRate)) {
+            const float inf = std::numeric_limits<float>::infinity();
+            out.parent = {{-inf, -inf, -inf}, {inf, inf, inf}};
+            out.rate = kSmallestRate;
+        }
         return {};
     }
 
@@ -297,13 +381,20 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
 }
 
 EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {
+    constexpr float inf = std::numeric_limits<float>::infinity();
     EntryFactor out;
-    out.bounded = solid_after.finite();
+    const float everywhere = warp_lipschitz(warp, {{-inf, -inf, -inf}, {inf, inf, inf}});
+    if (everywhere == 1.0f) return out;
+    if (warp_rows()[warp.kind].how == KindRow::Value && !solid_after.finite()) {
+        out.lipschitz = everywhere;
+        return out;
+    }
+    out.bounded = true;
     out.lipschitz = warp_lipschitz(warp, solid_after);
-    if (!out.bounded || out.lipschitz == 1.0f) return out;
     // The wider the margin, the farther the value stays close to the true distance, but the larger the factor.
     const vec3 half = solid_after.half_extents();
-    const float size = std::max({half.x, half.y, half.z});
+    float size = 0;
+    for (float extent : {half.x, half.y, half.z}) size = std::max(size, std::isfinite(extent) ? extent : 0.0f);
     for (float share : {0.25f, 0.125f, 0.0625f, 0.03125f}) {
         out.margin = share * size;
         const float l = warp_lipschitz(warp, solid_after.inflated(out.margin));
@@ -312,7 +403,7 @@ EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {
             return out;
         }
     }
-    out.lipschitz = std::numeric_limits<float>::infinity();
+    out.lipschitz = inf;
     return out;
 }
 

@@ -14,6 +14,7 @@ namespace kiln::sdf {
 struct NodeBounds {
     std::vector<Box3> stages;  ///< [0] content, [i + 1] after domain[i]
     Box3 parent;
+    float rate = 1;       ///< (0, 1]: outside `parent` the node's value is at least rate · distance(p, parent)
     uint64_t leaves = 1;  ///< primitives it expands to, copies counted
 };
 
@@ -45,11 +46,11 @@ struct Resolved {
 Result<Resolved> resolve(const Source& source, Fault* fault);
 
 /// The margin m and factor L of a Lipschitz-bounded entry: its divided child is proven on the solid's box inflated by m
-/// (architecture: bounded leaf). L is 1 where nothing is needed.
+/// (architecture: bounded leaf). An entry that stretches nothing anywhere, or a value entry on an unbounded solid, needs no box.
 struct EntryFactor {
     float lipschitz = 1;
     float margin = 0;
-    bool bounded = false;  ///< the box is finite, so the bounded-leaf form applies
+    bool bounded = false;  ///< evaluated as a bounded leaf
 };
 EntryFactor entry_factor(const Warp& warp, const Box3& solid_after);
 

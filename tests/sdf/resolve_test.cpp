@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: MIT
+// Bounds and rates of whole edits: outside its box an edit's value is at least rate · distance to the box. Over every shape, warp,
+// operation, transform and random trees of them, with the program's value in double precision.
+
+#include "texts.h"
+
+#include "sdf/eval.h"
+#include "sdf/program.h"
+
+#include <kiln/shapes.h>
+
+namespace kiln::sdf {
+namespace {
+
+struct Scene {
+    std::vector<Edit> edits{Edit{}};
+    std::vector<Object> objects;
+    HeightGrid grid{kGridSide, kGridSide, {std::begin(kGrid), std::end(kGrid)}};
+    Source source() const { return {edits, objects, {&grid, 1}}; }
+    Node& node() { return edits[0].node; }
+};
+
+constexpr int kAny = -1;
+
+Shape random_shape(Random& random, int kind = kAny) {
+    Shape out;
+    out.kind = uint16_t(kind == kAny ? random.below(int(shape_rows().size())) : kind);
+    const KindRow& row = shape_rows()[out.kind];
+    out.params = random.params(row);
+    // Of about a metre, so that what meets in a tree overlaps.
+    for (const FieldRow& f : row.fields()) {
+        for (int i = 0; i < f.arity && f.unit == "m"; ++i)
+            out.params[size_t(f.offset + i)] = std::min(out.params[size_t(f.offset + i)], 1.0f);
+        if (f.range == "internal") out.params[size_t(f.offset)] = 0;
+    }
+    if (row.how == KindRow::Sampled) out.data = "0";
+    return out;
+}
+
+Warp random_warp(Random& random, int kind = kAny) {
+    Warp out;
+    out.kind = uint16_t(kind == kAny ? random.below(int(warp_rows().size())) : kind);
+    out.params = random.params(warp_rows()[out.kind]);
+    if (warp_rows()[out.kind].how == KindRow::Copies) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            out.params[axis] = random.one_in(3) ? 0.0f : float(random.in(2, 12));
+            out.params[axis + 3] = float(1 + random.below(4));
+        }
+    }
+    return out;
+}
+
+Transform random_transform(Random& random) {
+    Transform out;
+    const auto number = [&] { return float(random.in(-1, 1)); };
+    out.position = {number(), number(), number()};
+    out.rotation = axis_angle(normalize(vec3{number(), number(), number() + 1.1f}), 3 * number());
+    const auto scale = [&] { return float(std::pow(4.0, random.in(-1, 1))); };
+    if (random.one_in(3)) out.scale = vec3{1, 1, 1} * scale();
+    if (random.one_in(3)) out.scale = {scale(), scale(), scale()};
+    return out;
+}
+
+void dress(Random& random, Node& node) {
+    node.transform = random_transform(random);
+    for (int n = random.below(3); n > 0; --n) node.domain.push_back(random_warp(random));
+}
+
+// A tree of up to `most` nodes; leaves may place one of the objects before `objects`.
+Object random_tree(Random& random, int most, int objects) {
+    Object out;
+    out.nodes.emplace_back();
+    for (size_t n = 0; n < out.nodes.size(); ++n) {
+        Node node;
+        dress(random, node);
+        if (n == 0 || (random.one_in(3) && int(out.nodes.size()) < most)) {
+            node.kind = Node::Kind::Fold;
+            node.op = Op(random.below(3));
+            node.blend_radius = random.one_in(2) ? 0.0f : float(random.in(0.01, 0.8));
+            for (int c = random.below(4) + 1; c > 0; --c) {
+                node.children.push_back(uint32_t(out.nodes.size()));
+                out.nodes.emplace_back();
+            }
+        } else if (objects > 0 && random.one_in(3)) {
+            node.kind = Node::Kind::Object;
+            node.object = ObjectId{uint32_t(random.below(objects)), 0};
+        } else {
+            node.shape = random_shape(random);
+        }
+        out.nodes[n] = node;
+    }
+    return out;
+}
+
+std::string describe(const Node& node) {
+    std::ostringstream out;
+    out.precision(9);
+    if (node.kind == Node::Kind::Shape) out << show(shape_rows()[node.shape.kind], node.shape.params);
+    if (node.kind == Node::Kind::Object) out << "object " << node.object.index;
+    if (node.kind == Node::Kind::Fold) {
+        out << "op " << int(node.op) << " k " << node.blend_radius << " of";
+        for (uint32_t c : node.children) out << ' ' << c;
+    }
+    for (const Warp& w : node.domain) out << " -> " << show(warp_rows()[w.kind], w.params);
+    const vec3 s = node.transform.scale;
+    out << " scale (" << s.x << ' ' << s.y << ' ' << s.z << ")";
+    return out.str();
+}
+std::string describe(const Scene& scene) {
+    std::string out = "\nedit: " + describe(scene.edits[0].node);
+    for (const Object& o : scene.objects) {
+        out += "\nobject:";
+        for (const Node& n : o.nodes) out += "\n  " + describe(n);
+    }
+    return out;
+}
+
+double off(double x, float lo, float hi) { return std::max({double(lo) - x, x - double(hi), 0.0}); }
+
+// A point beyond at least one finite face, near or far; nothing where every face is infinite.
+bool outside_point(Random& random, const Box3& box, double size, Point& p) {
+    const float lo[3] = {box.min.x, box.min.y, box.min.z}, hi[3] = {box.max.x, box.max.y, box.max.z};
+    bool any = false;
+    for (size_t a = 0; a < 3; ++a) {
+        const double from = std::isfinite(lo[a]) ? double(lo[a]) : std::isfinite(hi[a]) ? double(hi[a]) - size : -size;
+        const double to = std::isfinite(hi[a]) ? double(hi[a]) : from + size;
+        const double beyond = size * std::pow(10.0, random.in(-3, 1));
+        const int where = random.below(3);
+        p[a] = random.in(from, to);
+        if (where == 0 && std::isfinite(lo[a])) p[a] = from - beyond;
+        if (where == 1 && std::isfinite(hi[a])) p[a] = to + beyond;
+        any = any || off(p[a], lo[a], hi[a]) > 0;
+    }
+    return any;
+}
+
+// The smallest value / (rate · distance) seen; infinite where the scene does not compile or nothing is outside.
+double expect_rate(Random& random, const Scene& scene, int points) {
+    double tightest = std::numeric_limits<double>::infinity();
+    const Result<Program> program = compile(scene.source());
+    if (!program) return tightest;
+    const EditSpan& edit = program->edits[0];
+    RC_ASSERT(edit.rate > 0 && edit.rate <= 1);
+    double size = 1;
+    for (float face : {edit.bounds.min.x, edit.bounds.min.y, edit.bounds.min.z, edit.bounds.max.x, edit.bounds.max.y,
+                       edit.bounds.max.z})
+        if (std::isfinite(face)) size = std::max(size, std::fabs(double(face)));
+    for (int i = 0; i < points; ++i) {
+        Point p;
+        if (!outside_point(random, edit.bounds, size, p)) continue;
+        const double far = std::hypot(off(p[0], edit.bounds.min.x, edit.bounds.max.x),
+                                      off(p[1], edit.bounds.min.y, edit.bounds.max.y),
+                                      off(p[2], edit.bounds.min.z, edit.bounds.max.z));
+        const double promised = double(edit.rate) * far;
+        const double value = evaluate(view(*program), dvec3{p[0], p[1], p[2]});
+        tightest = std::min(tightest, value / promised);
+        if (value < promised * (1 - 1e-5) - 2e-5 * (size + magnitude(p)) * double(edit.rate)) {
+            RC_FAIL(describe(scene) + "\n at " + show(p) + ": " + std::to_string(value) + " < " + std::to_string(edit.rate) +
+                    " * " + std::to_string(far));
+        }
+    }
+    return tightest;
+}
+
+class RateOfEachShape : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachShape, testing::Range(0, int(shape_rows().size())),
+                         [](const auto& row) { return std::string(shape_rows()[size_t(row.param)].name); });
+
+TEST_P(RateOfEachShape, IsOneUnderUniformScaleAndHoldsUnderAny) {
+    for_all("shape", [&](Random& random) {
+        Scene scene;
+        scene.node().shape = random_shape(random, GetParam());
+        scene.node().transform = random_transform(random);
+        expect_rate(random, scene, 60);
+        const float s = scene.node().transform.scale.x;
+        scene.node().transform.scale = {s, s, s};
+        expect_rate(random, scene, 60);
+        const Result<Program> program = compile(scene.source());
+        // Composites are trees: spaceship's hull has a scale of its own.
+        RC_ASSERT(program->edits[0].rate == 1.0f || GetParam() >= primitive_count());
+    });
+}
+
+class RateOfEachWarp : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachWarp, testing::Range(0, int(warp_rows().size())),
+                         [](const auto& row) { return std::string(warp_rows()[size_t(row.param)].name); });
+
+TEST_P(RateOfEachWarp, HoldsOverShapesOfAnyScale) {
+    int judged = 0;
+    for_all("warp", [&](Random& random) {
+        Scene scene;
+        Object squeezed;
+        squeezed.nodes.emplace_back();
+        squeezed.nodes[0].shape = random_shape(random);
+        squeezed.nodes[0].transform = random_transform(random);
+        scene.objects.push_back(squeezed);
+        scene.node().kind = Node::Kind::Object;
+        scene.node().object = ObjectId{0, 0};
+        scene.node().domain = {random_warp(random, GetParam())};
+        scene.node().transform = random_transform(random);
+        judged += std::isfinite(expect_rate(random, scene, 100));
+    });
+    EXPECT_GT(judged, 10);
+}
+
+TEST(Rate, HoldsOverRandomTrees) {
+    int judged = 0;
+    for (int round = 0; round < 10; ++round) {
+        for_all("trees", [&](Random& random) {
+            Scene scene;
+            for (int o = 0; o < 3; ++o) scene.objects.push_back(random_tree(random, 12, o));
+            scene.node().kind = Node::Kind::Object;
+            scene.node().object = ObjectId{2, 0};
+            dress(random, scene.node());
+            judged += std::isfinite(expect_rate(random, scene, 60));
+        });
+    }
+    EXPECT_GT(judged, 100);
+}
+
+// ---- Each part of the proof with the scene that needs it.
+
+Node shaped(Shape shape, vec3 scale = {1, 1, 1}, vec3 position = {}) {
+    Node out;
+    out.shape = std::move(shape);
+    out.transform.scale = scale;
+    out.transform.position = position;
+    return out;
+}
+
+Scene folded(Op op, float blend_radius, const std::vector<Node>& children) {
+    Scene scene;
+    Object object;
+    object.nodes.emplace_back();
+    object.nodes[0].kind = Node::Kind::Fold;
+    object.nodes[0].op = op;
+    object.nodes[0].blend_radius = blend_radius;
+    for (const Node& child : children) {
+        object.nodes[0].children.push_back(uint32_t(object.nodes.size()));
+        object.nodes.push_back(child);
+    }
+    scene.objects.push_back(object);
+    scene.node().kind = Node::Kind::Object;
+    scene.node().object = ObjectId{0, 0};
+    return scene;
+}
+
+
+TEST(Rate, RoundOfASqueezedBallReachesFarther) {
+    Scene scene;
+    Object squeezed;
+    squeezed.nodes = {shaped(Sphere{.radius = 0.5f}, {1, 1, 6})};
+    scene.objects.push_back(squeezed);
+    scene.node().kind = Node::Kind::Object;
+    scene.node().object = ObjectId{0, 0};
+    for (const Warp& warp : {Warp(Round{.radius = 0.2f}), Warp(Shell{.thickness = 0.4f})}) {
+        scene.node().domain = {warp};
+        EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0, 0, 4.1}), 0) << "beyond 3 + 0.2";
+        for_all("squeezed", [&](Random& random) { expect_rate(random, scene, 200); });
+    }
+}
+
+TEST(Rate, ManyBlendedBallsOnOneSpotBulgeFartherThanTwo) {
+    const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(6, shaped(Sphere{.radius = 0.5f})));
+    EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0.7, 0, 0}), 0) << "a pair reaches 0.6";
+    for_all("balls", [&](Random& random) { expect_rate(random, scene, 200); });
+}
+
+TEST(Rate, SqueezedOnesBulgeByTheirRateFarther) {
+    const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(2, shaped(Sphere{.radius = 0.5f}, {1, 1, 4})));
+    EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0, 0, 2.35}), 0) << "the pair alone reaches 2";
+    for_all("balls", [&](Random& random) { expect_rate(random, scene, 200); });
+}
+
+TEST(Rate, DisplacedGroundGrowsByItsFactorSlower) {
+    Scene scene;
+    scene.node().shape = Plane{};
+    scene.node().domain = {Displace{.amplitude = 0.2f, .frequency = 3}};
+    const auto program = compile(scene.source());
+    ASSERT_TRUE(program && std::isfinite(program->edits[0].bounds.max.y));
+    EXPECT_NEAR(program->edits[0].rate, 1 / (1 + 0.2f * 3 * 3.5f), 1e-6f);
+    for_all("ground", [&](Random& random) { expect_rate(random, scene, 200); });
+}
+
+TEST(Rate, AnIntersectionsBoxIsFartherThanAnyOfItsOperands) {
+    const Scene scene = folded(Op::Intersect, 0, {shaped(Box{.half_extents = {0.2f, 2, 2}}),
+                                                  shaped(Box{.half_extents = {2, 0.2f, 2}}),
+                                                  shaped(Box{.half_extents = {2, 2, 0.2f}})});
+    const auto program = compile(scene.source());
+    EXPECT_NEAR(program->edits[0].rate, 1 / std::sqrt(3.0f), 1e-6f);
+    EXPECT_NEAR(evaluate(view(*program), dvec3{1.2, 1.2, 1.2}), 1, 1e-6) << "sqrt(3) from the box";
+    for_all("corner", [&](Random& random) { expect_rate(random, scene, 200); });
+    const Scene one = folded(Op::Intersect, 0, {shaped(Sphere{.radius = 2}), shaped(Box{.half_extents = {0.2f, 0.2f, 0.2f}})});
+    EXPECT_EQ(compile(one.source())->edits[0].rate, 1) << "every face is the box's";
+}
+
+TEST(Rate, AGapPulledOpenBesideTheShapeIsInsideItsBounds) {
+    Scene scene;
+    Object aside;
+    aside.nodes = {shaped(Sphere{.radius = 0.2f}, {1, 1, 1}, {-0.3f, 0, 0})};
+    scene.objects.push_back(aside);
+    scene.node().kind = Node::Kind::Object;
+    scene.node().object = ObjectId{0, 0};
+    scene.node().domain = {Elongate{.half_extents = {2, 0, 0}}};
+    for_all("gap", [&](Random& random) { expect_rate(random, scene, 200); });
+}
+
+}  // namespace
+}  // namespace kiln::sdf
