@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: MIT
+// Shared: a counted pointer to a value that several snapshots may hold. write() hands the value out for change: the very one where
+// nobody else holds it, a copy where someone does, so a snapshot never sees a change. Counting is for any thread; one Shared object
+// belongs to one thread at a time.
+#pragma once
+
+#include "base/assert.h"
+
+#include <atomic>
+#include <cstdint>
+#include <utility>
+
+namespace kiln {
+
+template <typename T>
+class Shared {
+public:
+    Shared() = default;
+    template <typename... Args>
+    static Shared make(Args&&... args) {
+        Shared out;
+        out.box_ = new Box{{1}, T{std::forward<Args>(args)...}};
+        return out;
+    }
+    Shared(const Shared& other) : box_(other.box_) {
+        if (box_ != nullptr) box_->holders.fetch_add(1, std::memory_order_relaxed);
+    }
+    Shared(Shared&& other) noexcept : box_(std::exchange(other.box_, nullptr)) {}
+    Shared& operator=(Shared other) noexcept {
+        std::swap(box_, other.box_);
+        return *this;
+    }
+    ~Shared() {
+        if (box_ != nullptr && box_->holders.fetch_sub(1, std::memory_order_acq_rel) == 1) delete box_;
+    }
+
+    explicit operator bool() const { return box_ != nullptr; }
+    const T& operator*() const { return box_->value; }
+    const T* operator->() const { return &box_->value; }
+    const T* get() const { return box_ != nullptr ? &box_->value : nullptr; }
+
+    /// For the owner alone; makes a default value where there is none.
+    T& write() {
+        if (box_ == nullptr) {
+            *this = make();
+        } else if (box_->holders.load(std::memory_order_acquire) != 1) {
+            *this = make(std::as_const(box_->value));
+        }
+        return box_->value;
+    }
+    /// A fresh default value, without copying what was there.
+    T& renew() {
+        if (box_ == nullptr || box_->holders.load(std::memory_order_acquire) != 1) *this = make();
+        return box_->value;
+    }
+
+    friend bool operator==(const Shared& a, const Shared& b) { return a.box_ == b.box_; }
+
+private:
+    struct Box {
+        std::atomic<uint32_t> holders;
+        T value;
+    };
+    Box* box_ = nullptr;
+};
+
+}  // namespace kiln

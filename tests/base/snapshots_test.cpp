@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: MIT
+// The three containers that snapshots are made of: what one holder changes, another never sees.
+
+#include "base/append_array.h"
+#include "base/paged_array.h"
+#include "base/shared.h"
+
+#include <gtest/gtest.h>
+
+#include <numeric>
+#include <thread>
+#include <vector>
+
+namespace kiln {
+namespace {
+
+TEST(Shared, WritesInPlaceWhenAloneAndToACopyWhenNot) {
+    auto a = Shared<std::vector<int>>::make(std::vector<int>{1, 2});
+    const std::vector<int>* const where = a.get();
+    a.write().push_back(3);
+    EXPECT_EQ(a.get(), where);
+    const Shared<std::vector<int>> b = a;
+    a.write().push_back(4);
+    EXPECT_EQ(b->size(), 3u);
+    EXPECT_EQ(a->size(), 4u);
+    EXPECT_EQ(b.get(), where);
+    EXPECT_FALSE(a == b);
+    Shared<std::vector<int>> c = b;
+    EXPECT_TRUE(c.renew().empty());
+    EXPECT_EQ(b->size(), 3u);
+    Shared<int> none;
+    EXPECT_FALSE(none);
+    EXPECT_EQ(none.write(), 0);
+}
+
+TEST(Shared, HoldersOnOtherThreadsKeepTheirValue) {
+    auto value = Shared<std::vector<int>>::make(std::vector<int>(1000, 7));
+    std::vector<std::thread> readers;
+    for (int t = 0; t < 3; ++t) {
+        readers.emplace_back([held = value] {
+            Shared<std::vector<int>> mine = held;
+            EXPECT_EQ(std::accumulate(mine->begin(), mine->end(), 0), 7000);
+        });
+    }
+    for (int i = 0; i < 100; ++i) value.write()[size_t(i)] = i;
+    for (std::thread& t : readers) t.join();
+}
+
+TEST(AppendArray, ACopyKeepsItsLengthWhileTheNewestGrowsInPlace) {
+    AppendArray<int> a;
+    a.append({1, 2, 3});
+    const AppendArray<int> then = a;
+    const int* const where = a.data();
+    for (int i = 4; i < 40; ++i) a.push_back(i);
+    EXPECT_EQ(a.data(), where);
+    EXPECT_TRUE(a.extends(then));
+    EXPECT_EQ(then.size(), 3u);
+    AppendArray<int> fork = then;
+    fork.push_back(99);
+    EXPECT_NE(fork.data(), where) << "the place after the third is taken";
+    EXPECT_EQ(a[3], 4);
+    EXPECT_EQ(fork[3], 99);
+    EXPECT_FALSE(fork.extends(a));
+    for (int i = 0; i < 1000; ++i) a.push_back(i);
+    EXPECT_EQ(then[2], 3);
+    EXPECT_EQ(a.size(), 1039u);
+    EXPECT_EQ(a.subspan(36, 3)[1], 38) << "moved with all it held";
+}
+
+TEST(PagedArray, ChangesOnePageAndSharesTheRest) {
+    PagedArray<int, 8> a(-1);
+    a.resize_pages(200);
+    EXPECT_EQ(a[1599], -1);
+    EXPECT_EQ(a.find(3), nullptr);
+    a.write(25) = 5;
+    EXPECT_EQ(a[24], -1);
+    const PagedArray<int, 8> then = a;
+    a.write(26) = 6;
+    a.write(1000) = 7;
+    EXPECT_EQ(then[26], -1);
+    EXPECT_EQ(a[25], 5);
+    EXPECT_FALSE(a.same_page(then, 3));
+    EXPECT_TRUE(a.same_page(then, 4));
+    EXPECT_FALSE(a.same_page(then, 125));
+    a.resize_pages(300);
+    EXPECT_EQ(a[2399], -1);
+    EXPECT_EQ(then.size(), 1600u);
+}
+
+}  // namespace
+}  // namespace kiln
