@@ -51,11 +51,55 @@ BENCHMARK(build_field)
     ->Args({0, 10000})
     ->Unit(benchmark::kMillisecond);
 
-void bake_bricks(benchmark::State& state) {
-    const auto field = *field::Field::build(program(recipe(int(state.range(0)), 5, 1000)), options());
-    for (auto _ : state) benchmark::DoNotOptimize(field::HostBricks::bake(field, 1));
+void build_and_bake(benchmark::State& state) {
+    const auto p = program(recipe(int(state.range(0)), 5, uint32_t(state.range(1))));
+    field::HostBricks last;
+    for (auto _ : state) {
+        auto bricks = field::HostBricks::build(p, options());
+        last = std::move(*bricks);
+    }
+    const field::BuildStats& stats = last.field().stats();
+    state.counters["bricks"] = stats.bricks;
+    state.counters["evaluated"] = double(stats.cells_evaluated);
+    state.counters["tested"] = double(stats.cells_tested);
+    state.counters["code"] = double(last.field().code().size()) / stats.bricks;
 }
-BENCHMARK(bake_bricks)->Arg(0)->Arg(1)->Arg(2)->Unit(benchmark::kMillisecond);
+BENCHMARK(build_and_bake)
+    ->Args({0, 1000})
+    ->Args({1, 1000})
+    ->Args({2, 1000})
+    ->Args({0, 10000})
+    ->Args({0, 100000})
+    ->Unit(benchmark::kMillisecond);
+
+void one_edit(benchmark::State& state) {
+    const auto p = program(recipe(int(state.range(0)), 5, uint32_t(state.range(1))));
+    const field::HostBricks fresh = *field::HostBricks::build(p, options());
+    double bricks = 0;
+    uint32_t m = 0;
+    field::HostBricks bricks_now = fresh;
+    for (auto _ : state) {
+        if (m % 20 == 0) {
+            state.PauseTiming();
+            bricks_now = fresh;
+            state.ResumeTiming();
+        }
+        sdf::Program next = bricks_now.field().program();
+        const uint32_t row =
+            *sdf::insert(next, bite(m % 20), {}, {}, sdf::order_between(next.edits.back().order, UINT64_MAX), 0);
+        const field::RowChange change{field::kNoRow, row};
+        (void)bricks_now.update(std::make_shared<const sdf::Program>(std::move(next)), {&change, 1});
+        bricks += double(bricks_now.field().jobs().size());
+        ++m;
+    }
+    state.counters["bricks"] = bricks / m;
+}
+BENCHMARK(one_edit)
+    ->Args({0, 1000})
+    ->Args({1, 1000})
+    ->Args({2, 1000})
+    ->Args({0, 100000})
+    ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace kiln::bench

@@ -46,6 +46,8 @@ public:
     Result<EditId> add(Edit edit);
     Result<void> change(EditId id, Edit edit);
     Result<void> remove(EditId id);
+    /// Moves an edit to stand just before another; before none: to the end.
+    Result<void> reorder(EditId id, EditId before);
     const Edit* find(EditId id) const;  ///< null when stale; valid until the next change
     std::optional<EditId> find_edit(std::string_view name) const;
     std::vector<EditId> edits() const;  ///< in order

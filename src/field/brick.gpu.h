@@ -23,6 +23,14 @@ KILN_CONST uint kCellInside = 0x40000000u;
 KILN_CONST uint kCellSlotMask = 0x00ffffffu;
 KILN_CONST int kMaxJump = 7;
 
+// Cell words lie in pages of kCellPage cells a side, x fastest in both: the word of a cell counted from the grid's first, for a map of
+// that many pages along x and y. A page's cells beyond the grid mean nothing.
+KILN_CONST int kCellPage = 8;
+KILN_FN int cell_word_index(int x, int y, int z, int pages_x, int pages_y) {
+    int page = ((z >> 3) * pages_y + (y >> 3)) * pages_x + (x >> 3);
+    return page * 512 + (z & 7) * 64 + (y & 7) * 8 + (x & 7);
+}
+
 // One per pool slot, in a storage buffer (32 bytes): where the brick is and which code describes it.
 struct BrickRecord {
     int texel_x, texel_y, texel_z;  // global texel index of texel (0, 0, 0): 7 * cell
@@ -31,7 +39,7 @@ struct BrickRecord {
     uint pad_0, pad_1, pad_2;
 };
 
-// The grid (32 bytes): cell (x, y, z) of the world is at index ((z - cell_z) * size_y + (y - cell_y)) * size_x + (x - cell_x).
+// The grid (32 bytes).
 struct GridParams {
     int cell_x, cell_y, cell_z;  // first cell of the grid, in world cells of 7 voxels
     float voxel_size;            // metres

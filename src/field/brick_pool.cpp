@@ -3,6 +3,9 @@
 
 #include "base/assert.h"
 
+#include <algorithm>
+#include <bit>
+
 namespace kiln::field {
 
 uint32_t BrickPool::allocate() {
@@ -10,35 +13,28 @@ uint32_t BrickPool::allocate() {
         ++refused_;
         return kNoSlot;
     }
-    ++in_use_;
-    uint32_t slot = uint32_t(taken_.size());
-    if (free_.empty()) {
-        taken_.push_back(true);
-    } else {
-        slot = free_.top();
-        free_.pop();
-        taken_[slot] = true;
+    uint32_t slot = slot_count_;
+    for (uint32_t word = first_free_ / 64; word * 64 < slot_count_; ++word) {
+        const uint64_t free = ~taken_[word];
+        if (free == 0) continue;
+        slot = std::min(slot_count_, word * 64 + uint32_t(std::countr_zero(free)));
+        break;
     }
+    if (slot == slot_count_) {
+        ++slot_count_;
+        taken_.resize_pages(slot / 64 / 64 + 1);
+    }
+    taken_.write(slot / 64) |= uint64_t(1) << (slot % 64);
+    first_free_ = slot + 1;
+    ++in_use_;
     return slot;
 }
 
 void BrickPool::release(uint32_t slot) {
-    KILN_ASSERT(slot < taken_.size() && taken_[slot], "slot {} of {} is not in use", slot, taken_.size());
-    taken_[slot] = false;
-    free_.push(slot);
+    KILN_ASSERT(used(slot), "slot {} of {} is not in use", slot, slot_count_);
+    taken_.write(slot / 64) &= ~(uint64_t(1) << (slot % 64));
+    first_free_ = std::min(first_free_, slot);
     --in_use_;
-}
-
-void BrickPool::adopt(const std::vector<bool>& used) {
-    KILN_ASSERT(taken_.empty() && used.size() <= capacity_, "{} slots known, {} adopted", taken_.size(), used.size());
-    taken_ = used;
-    for (uint32_t slot = 0; slot < used.size(); ++slot) {
-        if (used[slot]) {
-            ++in_use_;
-        } else {
-            free_.push(slot);
-        }
-    }
 }
 
 }  // namespace kiln::field

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT
 // Brick pool: which slots of the atlas are in use. The lowest free slot is handed out first, so that the same requests get the
-// same slots. Capacity is fixed at creation; allocate() answers kNoSlot when full and `refused()` counts it.
+// same slots. Capacity is fixed at creation; allocate() answers kNoSlot when full and `refused()` counts it. A copy is cheap.
 #pragma once
 
+#include "base/paged_array.h"
+
 #include <cstdint>
-#include <functional>
-#include <queue>
-#include <vector>
 
 namespace kiln::field {
 
@@ -18,17 +17,16 @@ public:
 
     uint32_t allocate();
     void release(uint32_t slot);
-    /// Declares slots [0, used.size()) known: those with used[i] true are taken, the others free. Only on a fresh pool.
-    void adopt(const std::vector<bool>& used);
+    bool used(uint32_t slot) const { return slot < slot_count_ && (taken_[slot / 64] >> (slot % 64) & 1u) != 0; }
 
     uint32_t in_use() const { return in_use_; }
-    uint32_t slot_count() const { return uint32_t(taken_.size()); }  ///< one past the highest slot ever handed out
+    uint32_t slot_count() const { return slot_count_; }  ///< one past the highest slot ever handed out
     uint32_t refused() const { return refused_; }
 
 private:
-    uint32_t capacity_, in_use_ = 0, refused_ = 0;
-    std::vector<bool> taken_;
-    std::priority_queue<uint32_t, std::vector<uint32_t>, std::greater<>> free_;
+    uint32_t capacity_, in_use_ = 0, refused_ = 0, slot_count_ = 0;
+    uint32_t first_free_ = 0;            // no free slot is below
+    PagedArray<uint64_t, 64> taken_{0};  // a bit a slot
 };
 
 }  // namespace kiln::field

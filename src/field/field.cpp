@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: MIT
-// Culling runs from the whole grid downwards: a node is a cube of 2^k cells, aligned in world cells; its code is its parent's,
-// pruned for the ball around its texels. Nodes above 8 cells are split level by level, those of 8 cells are independent tasks, each
-// depth first; their results are merged in the order of cells, so nothing depends on the number of workers.
-// build() is update() from a field without bricks.
+// A field is made in tasks: cubes of 16 cells. Each asks the index for the edits that reach it, folds their list at the centres of its 64
+// cubes of 4 cells, and for those that may hold a surface at their 64 cells (Barbier et al., "Lipschitz Pruning", 2025, branch in the
+// same way); what is left of the list is a cell's code, which is evaluated at its texels to see whether the cell owns a brick.
+// An update looks at the cells that the changed edits reach, and at nothing else: a small one takes those cells 64 at a time wherever
+// they lie, a large one takes tasks. Results are merged in the order of tasks, so nothing depends on the number of workers.
 
 #include "field/field.h"
 
 #include "base/assert.h"
 #include "base/parallel_for.h"
 #include "base/profile.h"
-#include "field/brick_pool.h"
-#include "field/code_match.h"
-#include "field/codes.gpu.h"
-#include "field/jumps.h"
-#include "sdf/eval.h"
-#include "sdf/prune.h"
+#include "sdf/cull.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <cmath>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -30,87 +25,37 @@ using Code = std::vector<sdf::Instruction>;
 
 namespace {
 
-constexpr int kTaskCells = 8;   // side of the nodes that are handed to workers
-constexpr int kTaskLevels = 4;  // 8, 4, 2, 1
+constexpr int kTaskCells = 16;
+constexpr int kGroupCells = 4;
+constexpr int kTaskPages = kTaskCells / kCellPage;
 constexpr int64_t kMaxCells = 1ll << 28;
 constexpr int64_t kMaxTexel = 1ll << 24;     // float holds every integer up to here
 constexpr float kHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
-
-int floor_div(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
+constexpr int64_t kFewCells = 4096;          // an update of fewer takes them as they come
 
 std::atomic<uint64_t> revisions{0};
 
-struct Node {
-    ivec3 cell;  // world cell of its least corner
-    int size;    // cells a side
-};
-
-// A node's ball: every texel of its cells lies in it, whatever float made of the positions.
-struct Ball {
-    vec3 center;
-    float radius;
-    float slack;  // rounding of texel positions and of values, metres
-};
-
-Ball ball_of(const Node& node, float h) {
-    const auto middle = [&](int cell) { return (float(cell) * 7.0f + 3.5f * float(node.size)) * h; };
-    Ball ball;
-    ball.center = {middle(node.cell.x), middle(node.cell.y), middle(node.cell.z)};
-    const float reach = kHalfDiagonal * float(node.size) * h;
-    const float far = std::max({std::fabs(ball.center.x), std::fabs(ball.center.y), std::fabs(ball.center.z)}) + reach;
-    ball.slack = 4e-6f * far;  // 64 ulps
-    ball.radius = reach + 5e-7f * far;
-    return ball;
-}
-
-// Texels of a brick, slice by slice.
-struct Slice {
-    alignas(64) float x[64], y[64], z[64];
-};
-
-void fill_slice(const ivec3& texel, int k, float h, Slice& out) {
-    for (int j = 0; j < kBrickTexels; ++j) {
-        for (int i = 0; i < kBrickTexels; ++i) {
-            const int at = j * kBrickTexels + i;
-            out.x[at] = float(texel.x + i) * h;
-            out.y[at] = float(texel.y + j) * h;
-            out.z[at] = float(texel.z + k) * h;
-        }
-    }
-}
+// Row i of a group of 64: x fastest.
+ivec3 place_of(int i) { return {i & 3, i >> 2 & 3, i >> 4}; }
 
 struct Leaf {
-    uint64_t cell;                  // index in the grid
-    uint32_t first = 0, count = 0;  // code, in the task's own; count 0: the brick goes
+    ivec3 cell;                               // counted from the grid's first
+    uint32_t code_first = 0, code_count = 0;  // in the task's code; count 0: the brick goes
     bool bake = false;
+    BrickContent content;
 };
 
-// A brick whose code only moved.
-struct Moved {
-    uint32_t slot;
-    uint32_t first;
+struct Emptied {
+    ivec3 cell;
+    bool inside;
 };
 
 struct TaskResult {
     std::vector<Leaf> leaves;
-    std::vector<Moved> moved;
+    std::vector<Emptied> empties;  // of an update: cells whose word is another
+    std::array<Shared<CellMap::Words::Page>, size_t(kTaskPages* kTaskPages* kTaskPages)> pages;  // of a build
     Code code;
-    std::vector<uint64_t> occupancy_changes;
     uint64_t cells_tested = 0, cells_evaluated = 0;
-};
-
-struct Scratch {
-    std::array<Code, kTaskLevels + 1> before,
-        after;  // [0]: of the task's parent, [1]: of the task's node, and so on downwards
-    sdf::PruneScratch prune;
-    Slice slice;
-};
-
-// A node with the code of its parent.
-struct Pending {
-    Node node;
-    bool in_old;  // the old field may have bricks in it, and `before` is its code there
-    Code before, after;
 };
 
 }  // namespace
@@ -118,40 +63,69 @@ struct Pending {
 class FieldBuilder {
 public:
     FieldBuilder(const Field* old, std::shared_ptr<const sdf::Program> program, const FieldOptions& options,
-                 std::span<const Box3> dirty)
-        : old_(old), program_(std::move(program)), options_(options), out_(new Field), dirty_(dirty) {}
+                 std::span<const RowChange> changes, MadeBricks* made)
+        : old_(old), program_(std::move(program)), options_(options), out_(new Field), changes_(changes), made_(made) {}
 
     Result<std::shared_ptr<const Field>> run() {
         KILN_PROFILE(old_ != nullptr ? "field update" : "field build");
         if (auto ok = lay_grid(); !ok) return ok.error();
-        if (old_ != nullptr) match_.emplace(*old_->program_, *program_);
-        std::vector<Pending> tasks = split_to_tasks();
-        std::vector<TaskResult> results(tasks.size());
-        parallel_for(tasks.size(), options_.workers, [&](int i) {
-            thread_local Scratch scratch;
-            Pending& task = tasks[size_t(i)];
-            scratch.before[0].swap(task.before);
-            scratch.after[0].swap(task.after);
-            descend(task.node, task.in_old, 0, scratch, results[size_t(i)]);
-        });
-        results.push_back(std::move(upper_));
-        if (auto ok = merge(results); !ok) return ok.error();
-        finish_jumps(results);
+        far_ = (kBandVoxels + 0.01f) * options_.voxel_size;
+        if (old_ == nullptr) {
+            build_tasks({{0, 0, 0}, size_});
+        } else {
+            find_dirty();
+            int64_t cells = 0;
+            CellBox all{};
+            for (const CellBox& box : dirty_) {
+                const ivec3 s = box.max - box.min;
+                cells += int64_t(s.x) * s.y * s.z;
+                all = joined(all, box);
+            }
+            if (cells > kFewCells) {
+                build_tasks(all);
+            } else if (cells > 0) {
+                results_.resize(dirty_.size());
+                Worker worker = make_worker();
+                for (size_t i = 0; i < dirty_.size(); ++i) few_cells(i, worker, results_[i]);
+            }
+        }
+        if (auto ok = merge(); !ok) return ok.error();
+        finish_jumps();
         out_->revision_ = ++revisions;
         out_->parent_revision_ = old_ != nullptr ? old_->revision_ : 0;
         return std::shared_ptr<const Field>(std::move(out_));
     }
 
 private:
+    // What a thread works with; its memory is kept from task to task.
+    struct Worker {
+        sdf::ListCuller culler;
+        sdf::ListCuller::Fold groups, cells;
+        BrickEvaluator evaluator;
+        std::vector<uint32_t> rows;
+        Code code;
+        ivec3 cell[64];  // of `cells`' balls
+    };
+
+    Worker make_worker() const {
+        return {sdf::ListCuller(*program_), {}, {}, BrickEvaluator(*program_, options_.voxel_size), {}, {}, {}};
+    }
+
     Result<void> lay_grid() {
         out_->program_ = program_;
         out_->options_ = options_;
         const float h = options_.voxel_size;
         if (!(h > 0) || !std::isfinite(h))
             return Error{"field: voxel size " + std::to_string(h) + "; must be above 0", ErrorKind::Usage};
+        if (!(options_.own_voxels >= 1 && options_.own_voxels <= kBandVoxels))
+            return Error{"field: own_voxels must be between 1 and the band's 4 voxels", ErrorKind::Usage};
         if (old_ != nullptr) {
             out_->grid_ = old_->grid_;
             out_->cells_ = old_->cells_;
+            out_->records_ = old_->records_;
+            out_->code_ = old_->code_;
+            out_->live_code_ = old_->live_code_;
+            out_->pool_ = old_->pool_;
             size_ = {out_->grid_.size_x, out_->grid_.size_y, out_->grid_.size_z};
             return {};
         }
@@ -179,307 +153,364 @@ private:
         }
         size_ = {size[0], size[1], size[2]};
         out_->grid_ = {first[0], first[1], first[2], h, size[0], size[1], size[2], 0};
-        out_->cells_.assign(size_t(cells), 0);
+        out_->cells_ = CellMap(size_);
+        out_->pool_ = BrickPool(std::min(options_.max_bricks, kCellSlotMask + 1));
         return {};
     }
 
-    // Root nodes: at most two an axis.
-    std::vector<Pending> split_to_tasks() {
-        const GridParams& g = out_->grid_;
-        int size = 1;
-        const auto wide = [&](int first, int count) {
-            return floor_div(first + count - 1, size) - floor_div(first, size) > 1;
+    ivec3 first_cell() const { return {out_->grid_.cell_x, out_->grid_.cell_y, out_->grid_.cell_z}; }
+
+    bool in_grid(ivec3 c) const {
+        return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < size_.x && c.y < size_.y && c.z < size_.z;
+    }
+
+    // The box of cells that an edit reaches, from the box of its influence.
+    CellBox cells_of(const Box3& box) const {
+        const double side = double(options_.voxel_size) * kBrickVoxels;
+        const ivec3 first = first_cell();
+        const auto low = [&](float a, int from, int size) {
+            return int(std::clamp(std::floor(double(a) / side - 0.01) - from, 0.0, double(size)));
         };
-        while (wide(g.cell_x, g.size_x) || wide(g.cell_y, g.size_y) || wide(g.cell_z, g.size_z)) size *= 2;
-        size = std::max(size, kTaskCells);
-        std::vector<Pending> level;
-        for (int z = floor_div(g.cell_z, size); z * size < g.cell_z + g.size_z; ++z) {
-            for (int y = floor_div(g.cell_y, size); y * size < g.cell_y + g.size_y; ++y) {
-                for (int x = floor_div(g.cell_x, size); x * size < g.cell_x + g.size_x; ++x) {
-                    level.push_back({{{x * size, y * size, z * size}, size},
-                                     old_ != nullptr,
-                                     old_ != nullptr ? old_->program_->code : Code{},
-                                     program_->code});
-                }
-            }
-        }
-        while (size > kTaskCells) {
-            std::vector<std::vector<Pending>> children(level.size());
-            std::vector<TaskResult> results(level.size());
-            parallel_for(level.size(), options_.workers, [&](int i) {
-                thread_local Scratch scratch;
-                Pending& parent = level[size_t(i)];
-                Code before, after;
-                bool in_old = parent.in_old;
-                if (!enter(parent.node, in_old, parent.before, parent.after, before, after, scratch,
-                           results[size_t(i)]))
-                    return;
-                for (int c = 0; c < 8; ++c) {
-                    const Node child = child_of(parent.node, c);
-                    if (outside(child)) continue;
-                    children[size_t(i)].push_back({child, in_old, before, after});
-                }
-            });
-            level.clear();
-            for (std::vector<Pending>& some : children) std::move(some.begin(), some.end(), std::back_inserter(level));
-            for (TaskResult& result : results) append(result, upper_);
-            size /= 2;
-        }
-        return level;
-    }
-
-    static void append(const TaskResult& from, TaskResult& to) {
-        const uint32_t base = uint32_t(to.code.size());
-        to.code.insert(to.code.end(), from.code.begin(), from.code.end());
-        for (Leaf leaf : from.leaves) {
-            leaf.first += base;
-            to.leaves.push_back(leaf);
-        }
-        for (Moved moved : from.moved) to.moved.push_back({moved.slot, moved.first + base});
-        to.occupancy_changes.insert(to.occupancy_changes.end(), from.occupancy_changes.begin(),
-                                    from.occupancy_changes.end());
-        to.cells_tested += from.cells_tested;
-        to.cells_evaluated += from.cells_evaluated;
-    }
-
-    static Node child_of(const Node& node, int c) {
-        const int half = node.size / 2;
-        return {{node.cell.x + (c & 1) * half, node.cell.y + ((c >> 1) & 1) * half, node.cell.z + (c >> 2) * half},
-                half};
-    }
-
-    // The node's cells that are in the grid, counted from the grid's first.
-    CellBox cells_of(const Node& node) const {
-        const GridParams& g = out_->grid_;
-        const ivec3 low = node.cell - ivec3{g.cell_x, g.cell_y, g.cell_z};
-        return grown({low, low + ivec3{node.size, node.size, node.size}}, 0, size_);
-    }
-
-    bool outside(const Node& node) const { return cells_of(node).empty(); }
-
-    uint64_t cell_index(int x, int y, int z) const {
-        return (uint64_t(z) * uint64_t(size_.y) + uint64_t(y)) * uint64_t(size_.x) + uint64_t(x);
-    }
-
-    template <typename Fn>
-    void each_cell(const Node& node, Fn&& fn) {
-        const CellBox box = cells_of(node);
-        for (int z = box.min.z; z < box.max.z; ++z) {
-            for (int y = box.min.y; y < box.max.y; ++y) {
-                for (int x = box.min.x; x < box.max.x; ++x) fn(cell_index(x, y, z));
-            }
-        }
-    }
-
-    // Prunes for the node, and settles it as a whole where that is possible: false then. `in_old` may turn false.
-    bool enter(const Node& node, bool& in_old, const Code& parent_before, const Code& parent_after, Code& before,
-               Code& after, Scratch& scratch, TaskResult& result) {
-        const Ball ball = ball_of(node, options_.voxel_size);
-        const auto beyond = [&](float value) {
-            return std::fabs(value) > ball.radius + options_.voxel_size + ball.slack + 4e-6f * std::fabs(value);
+        const auto high = [&](float a, int from, int size) {
+            return int(std::clamp(std::floor(double(a) / side + 0.01) + 1 - from, 0.0, double(size)));
         };
-        ++result.cells_tested;
-        const float value =
-            sdf::prune(sdf::view(*program_, parent_after), ball.center, ball.radius, after, scratch.prune);
-        bool was_beyond = false;
-        if (in_old) {
-            ++result.cells_tested;
-            const float old_value =
-                sdf::prune(sdf::view(*old_->program_, parent_before), ball.center, ball.radius, before, scratch.prune);
-            const CodeMatch::Answer answer = match_->compare(before, after);
-            if (answer == CodeMatch::Answer::Same) return false;
-            if (answer == CodeMatch::Answer::Moved) {
-                move_code(node, before, after, result);
-                return false;
-            }
-            was_beyond = beyond(old_value);
-            if (was_beyond && beyond(value) && (old_value < 0) == (value < 0)) return false;
-            in_old = !was_beyond;
-        }
-        if (beyond(value)) {
-            each_cell(node, [&](uint64_t cell) { make_empty(cell, value < 0, result); });
-            return false;
-        }
-        return true;
+        return {
+            {low(box.min.x, first.x, size_.x), low(box.min.y, first.y, size_.y), low(box.min.z, first.z, size_.z)},
+            {high(box.max.x, first.x, size_.x), high(box.max.y, first.y, size_.y), high(box.max.z, first.z, size_.z)}};
     }
 
-    void make_empty(uint64_t cell, bool inside, TaskResult& result) {
-        uint32_t& word = out_->cells_[cell];
-        if ((word & kCellOccupied) != 0) {
-            result.leaves.push_back({cell});
-            result.occupancy_changes.push_back(cell);
+    void find_dirty() {
+        const auto add = [&](uint32_t row) {
+            const sdf::EditSpan& span = program_->edits[row];
+            if (span.count == 0) return;
+            CellBox box{{0, 0, 0}, size_};
+            if (!span.everywhere()) {
+                const sdf::IndexedEdit edit = span.indexed(row);
+                const float more = program_->index.blend_allowance(edit.influence(far_), far_, row);
+                box = cells_of(edit.influence(far_ + more));
+            }
+            if (!box.empty()) dirty_.push_back(box);
+        };
+        for (const RowChange& change : changes_) {
+            if (change.removed != kNoRow) {
+                add(change.removed);
+                removed_.push_back(change.removed);
+            }
+            if (change.inserted != kNoRow) {
+                add(change.inserted);
+                inserted_.push_back(change.inserted);
+            }
         }
-        // The old jump may stay: update_jumps() rewrites every one that could differ.
-        word = (inside ? kCellInside : 0u) | ((word & kCellOccupied) != 0 ? 0u : word & 7u);
+        occupancy_changes_.resize(dirty_.size(), CellBox{});
     }
 
-    // Nothing here changed but where its numbers lie: bricks below refer to a part of `before`, which says where each went.
-    void move_code(const Node& node, const Code& before, const Code& after, TaskResult& result) {
-        std::vector<std::pair<uint32_t, uint32_t>> map;
-        each_cell(node, [&](uint64_t cell) {
-            const uint32_t word = out_->cells_[cell];
-            if ((word & kCellOccupied) == 0) return;
-            if (map.empty()) {
-                for (size_t i = 0; i < before.size(); ++i) map.emplace_back(before[i].param, after[i].param);
-                std::sort(map.begin(), map.end());
-            }
-            const BrickRecord& record = old_->records_[word & kCellSlotMask];
-            result.moved.push_back({word & kCellSlotMask, uint32_t(result.code.size())});
-            for (uint32_t i = 0; i < record.code_count; ++i) {
-                sdf::Instruction in = old_->code_[record.code_first + i];
-                const auto found = std::lower_bound(map.begin(), map.end(), std::pair(in.param, 0u));
-                // Instructions without numbers hold 0, as Empty (the tape's first) does.
-                if (found != map.end() && found->first == in.param) in.param = found->second;
-                result.code.push_back(in);
-            }
+    bool is_dirty(ivec3 c) const {
+        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return contains(b, c); });
+    }
+    static bool contains(const CellBox& b, ivec3 c) {
+        return c.x >= b.min.x && c.y >= b.min.y && c.z >= b.min.z && c.x < b.max.x && c.y < b.max.y && c.z < b.max.z;
+    }
+    bool is_dirty(const CellBox& box) const {
+        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) {
+            return box.min.x < b.max.x && box.min.y < b.max.y && box.min.z < b.max.z && b.min.x < box.max.x &&
+                   b.min.y < box.max.y && b.min.z < box.max.z;
         });
     }
 
-    // scratch.before[level], after[level]: code of the node's parent.
-    void descend(const Node& node, bool in_old, size_t level, Scratch& scratch, TaskResult& result) {
-        if (!enter(node, in_old, scratch.before[level], scratch.after[level], scratch.before[level + 1],
-                   scratch.after[level + 1], scratch, result)) {
-            return;
-        }
-        if (node.size == 1) {
-            finish_leaf(node, scratch.after[level + 1], scratch, result);
-            return;
-        }
-        for (int c = 0; c < 8; ++c) {
-            const Node child = child_of(node, c);
-            if (!outside(child)) descend(child, in_old, level + 1, scratch, result);
-        }
+    // Rows that reach the box of cells, in order.
+    void find_rows(const CellBox& box, std::vector<uint32_t>& rows) const {
+        const float side = options_.voxel_size * kBrickVoxels;
+        const ivec3 first = first_cell();
+        const auto world = [&](int x, int y, int z) {
+            return vec3{float(x + first.x) * side, float(y + first.y) * side, float(z + first.z) * side};
+        };
+        const Box3 metres = Box3{world(box.min.x, box.min.y, box.min.z), world(box.max.x, box.max.y, box.max.z)};
+        const Box3 wide = metres.inflated(0.01f * options_.voxel_size);
+        rows.clear();
+        program_->index.find(wide, far_ + program_->index.blend_allowance(wide, far_), rows);
+        std::sort(rows.begin(), rows.end(),
+                  [&](uint32_t a, uint32_t b) { return program_->edits[a].order < program_->edits[b].order; });
     }
 
-    void finish_leaf(const Node& node, const Code& code, Scratch& scratch, TaskResult& result) {
-        ++result.cells_evaluated;
-        const CellBox box = cells_of(node);
-        const uint64_t cell = cell_index(box.min.x, box.min.y, box.min.z);
-        const ivec3 texel{node.cell.x * kBrickVoxels, node.cell.y * kBrickVoxels, node.cell.z * kBrickVoxels};
+    // Ball i around the cube of `size` cells whose least corner is `cell`: every texel of it lies inside, whatever float made of positions.
+    void place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const {
         const float h = options_.voxel_size;
-        const sdf::TapeView tape = sdf::view(*program_, code);
-        bool occupied = false, inside = false;
-        for (int k : {3, 4, 0, 7, 1, 6, 2, 5}) {  // the middle, then the faces: most surfaces show early
-            float values[64];
-            fill_slice(texel, k, h, scratch.slice);
-            sdf::evaluate(tape, {scratch.slice.x, scratch.slice.y, scratch.slice.z, 64}, values);
-            for (const float value : values) occupied = occupied || std::fabs(value) < h;
-            inside = values[0] < 0;
-            if (occupied) break;
-        }
-        if (!occupied) {
-            make_empty(cell, inside, result);
-            return;
-        }
-        const uint32_t word = out_->cells_[cell];
-        Leaf leaf{cell, uint32_t(result.code.size()), uint32_t(code.size()), true};
-        if ((word & kCellOccupied) == 0) {
-            result.occupancy_changes.push_back(cell);
-        } else if (!in_dirty(texel)) {
-            const BrickRecord& record = old_->records_[word & kCellSlotMask];
-            leaf.bake =
-                stores_differ(texel, {old_->code_.data() + record.code_first, record.code_count}, code, scratch);
-        }
-        result.leaves.push_back(leaf);
-        result.code.insert(result.code.end(), code.begin(), code.end());
+        const ivec3 first = first_cell();
+        const auto middle = [&](int c) { return (float(c) * 7.0f + 3.5f * float(size)) * h; };
+        balls.x[i] = middle(cell.x + first.x);
+        balls.y[i] = middle(cell.y + first.y);
+        balls.z[i] = middle(cell.z + first.z);
     }
 
-    bool in_dirty(const ivec3& texel) const {
-        const float h = options_.voxel_size;
-        const Box3 brick{{float(texel.x) * h, float(texel.y) * h, float(texel.z) * h},
-                         {float(texel.x + 7) * h, float(texel.y + 7) * h, float(texel.z + 7) * h}};
-        const Box3 wide = brick.inflated((kBandVoxels + 1) * h);
-        return std::any_of(dirty_.begin(), dirty_.end(), [&](const Box3& box) { return box.overlaps(wide); });
+    float largest(const sdf::Balls& balls, int i, int size) const {
+        return std::max({std::fabs(balls.x[i]), std::fabs(balls.y[i]), std::fabs(balls.z[i])}) +
+               kHalfDiagonal * float(size) * options_.voxel_size;
     }
 
-    // Whether some texel would be stored otherwise: its distance, or within the band its materials.
-    bool stores_differ(const ivec3& texel, std::span<const sdf::Instruction> before, const Code& after,
-                       Scratch& scratch) {
-        const float h = options_.voxel_size;
-        for (int k = 0; k < kBrickTexels; ++k) {
-            float a[64], b[64];
-            sdf::MaterialMix mix_a[64], mix_b[64];
-            fill_slice(texel, k, h, scratch.slice);
-            const sdf::Points points{scratch.slice.x, scratch.slice.y, scratch.slice.z, 64};
-            sdf::evaluate_materials(sdf::view(*old_->program_, before), points, a, mix_a);
-            sdf::evaluate_materials(sdf::view(*program_, after), points, b, mix_b);
-            for (size_t i = 0; i < 64; ++i) {
-                const float da = a[i] / h, db = b[i] / h;
-                const bool half = options_.format == DistanceFormat::Half;
-                if (half ? half_code(da) != half_code(db) : snorm8_code(da) != snorm8_code(db)) return true;
-                if ((std::fabs(da) < kBandVoxels) != (std::fabs(db) < kBandVoxels)) return true;
-                if (std::fabs(da) < kBandVoxels && (mix_a[i].id0 != mix_b[i].id0 || mix_a[i].id1 != mix_b[i].id1 ||
-                                                    mix_a[i].weight != mix_b[i].weight)) {
-                    return true;
+    // One radius for all: the grid's farthest corner decides what rounding may add.
+    void size_balls(sdf::Balls& balls, int size) const {
+        const float h = options_.voxel_size, rounding = 5e-7f * farthest();
+        balls.radius = kHalfDiagonal * float(size) * h + rounding;
+        balls.half_side = 3.5f * float(size) * h + rounding;
+        balls.far = far_;
+    }
+
+    float farthest() const {
+        const GridParams& g = out_->grid_;
+        const auto reach = [](int first, int size) { return std::max(std::abs(first), std::abs(first + size)); };
+        const int cells = std::max({reach(g.cell_x, g.size_x), reach(g.cell_y, g.size_y), reach(g.cell_z, g.size_z)});
+        return float(cells + kTaskCells) * kBrickVoxels * options_.voxel_size;
+    }
+
+    // No texel in the ball is near enough to the surface for a brick.
+    bool beyond(const sdf::ListCuller::Fold& fold, int i, int size) const {
+        const float v = std::fabs(fold.value[i]);
+        return v > fold.balls.radius + options_.own_voxels * options_.voxel_size +
+                       4e-6f * (largest(fold.balls, i, size) + v);
+    }
+
+    void build_tasks(const CellBox& all) {
+        std::vector<ivec3> tasks;
+        const auto aligned = [](int a) { return a / kTaskCells * kTaskCells; };
+        for (int z = aligned(all.min.z); z < all.max.z; z += kTaskCells) {
+            for (int y = aligned(all.min.y); y < all.max.y; y += kTaskCells) {
+                for (int x = aligned(all.min.x); x < all.max.x; x += kTaskCells) {
+                    const ivec3 at{x, y, z};
+                    if (old_ == nullptr || is_dirty(CellBox{at, at + ivec3{kTaskCells, kTaskCells, kTaskCells}}))
+                        tasks.push_back(at);
                 }
             }
+        }
+        tasks_ = std::move(tasks);
+        results_.resize(tasks_.size());
+        parallel_for(tasks_.size(), options_.workers, [&](int i) {
+            Worker worker = make_worker();
+            run_task(tasks_[size_t(i)], worker, results_[size_t(i)]);
+        });
+    }
+
+    void run_task(ivec3 at, Worker& worker, TaskResult& result) {
+        const CellBox box = grown({at, at + ivec3{kTaskCells, kTaskCells, kTaskCells}}, 0, size_);
+        find_rows(box, worker.rows);
+        if (worker.rows.empty() && old_ == nullptr) return;
+        sdf::ListCuller::Fold& groups = worker.groups;
+        groups.list = worker.culler.list_of(worker.rows);
+        groups.balls.live = 0;
+        for (int i = 0; i < 64; ++i) {
+            const ivec3 p = place_of(i),
+                        cell{at.x + p.x * kGroupCells, at.y + p.y * kGroupCells, at.z + p.z * kGroupCells};
+            place_ball(groups.balls, i, cell, kGroupCells);
+            const CellBox group = grown({cell, cell + ivec3{kGroupCells, kGroupCells, kGroupCells}}, 0, size_);
+            if (!group.empty() && (old_ == nullptr || is_dirty(group))) groups.balls.live |= uint64_t(1) << i;
+        }
+        size_balls(groups.balls, kGroupCells);
+        worker.culler.fold(groups);
+        uint64_t open = 0;
+        for (int i = 0; i < 64; ++i) {
+            if ((groups.balls.live >> i & 1u) == 0) continue;
+            ++result.cells_tested;
+            if (!beyond(groups, i, kGroupCells)) {
+                open |= uint64_t(1) << i;
+                continue;
+            }
+            const bool inside = groups.value[i] < 0;
+            if (!inside && old_ == nullptr) continue;  // as unwritten cells read
+            for (int c = 0; c < 64; ++c) {
+                const ivec3 cell = cell_in(at, i, c);
+                if (in_grid(cell) && (old_ == nullptr || is_dirty(cell))) set_empty(cell, inside, at, result);
+            }
+        }
+        worker.culler.keep(groups, open);
+        for (int i = 0; i < 64; ++i) {
+            if ((open >> i & 1u) == 0) continue;
+            sdf::ListCuller::Fold& cells = worker.cells;
+            cells.list = worker.culler.child(groups, i);
+            cells.balls.live = 0;
+            for (int c = 0; c < 64; ++c) {
+                worker.cell[c] = cell_in(at, i, c);
+                place_ball(cells.balls, c, worker.cell[c], 1);
+                if (in_grid(worker.cell[c]) && (old_ == nullptr || is_dirty(worker.cell[c])))
+                    cells.balls.live |= uint64_t(1) << c;
+            }
+            run_cells(worker, at, result);
+            worker.culler.drop(cells.list);
+        }
+        worker.culler.drop(groups.list);
+    }
+
+    static ivec3 cell_in(ivec3 task, int group, int c) {
+        const ivec3 g = place_of(group), p = place_of(c);
+        return {task.x + g.x * kGroupCells + p.x, task.y + g.y * kGroupCells + p.y, task.z + g.z * kGroupCells + p.z};
+    }
+
+    // The cells of one dirty box that no earlier one has.
+    void few_cells(size_t which, Worker& worker, TaskResult& result) {
+        const CellBox& box = dirty_[which];
+        const std::span<const CellBox> earlier = std::span(dirty_).first(which);
+        find_rows(box, worker.rows);
+        sdf::ListCuller::Fold& cells = worker.cells;
+        cells.list = worker.culler.list_of(worker.rows);
+        int n = 0;
+        const auto run = [&] {
+            if (n == 0) return;
+            cells.balls.live = n == 64 ? ~uint64_t(0) : (uint64_t(1) << n) - 1;
+            for (int i = n; i < 64; ++i) place_ball(cells.balls, i, worker.cell[n - 1], 1);
+            run_cells(worker, {}, result);
+            n = 0;
+        };
+        for (int z = box.min.z; z < box.max.z; ++z) {
+            for (int y = box.min.y; y < box.max.y; ++y) {
+                for (int x = box.min.x; x < box.max.x; ++x) {
+                    const ivec3 cell{x, y, z};
+                    if (std::any_of(earlier.begin(), earlier.end(),
+                                    [&](const CellBox& b) { return contains(b, cell); }))
+                        continue;
+                    worker.cell[n] = cell;
+                    place_ball(cells.balls, n, cell, 1);
+                    if (++n == 64) run();
+                }
+            }
+        }
+        run();
+        worker.culler.drop(cells.list);
+    }
+
+    // worker.cells has its list, its balls' places and which of them to look at.
+    void run_cells(Worker& worker, ivec3 task, TaskResult& result) {
+        sdf::ListCuller::Fold& cells = worker.cells;
+        size_balls(cells.balls, 1);
+        worker.culler.fold(cells);
+        uint64_t open = 0;
+        for (int i = 0; i < 64; ++i) {
+            if ((cells.balls.live >> i & 1u) == 0) continue;
+            ++result.cells_tested;
+            if (beyond(cells, i, 1)) {
+                set_empty(worker.cell[i], cells.value[i] < 0, task, result);
+            } else {
+                open |= uint64_t(1) << i;
+            }
+        }
+        if (open == 0) return;
+        worker.culler.keep(cells, open);
+        const uint64_t came = inserted_.empty() ? 0 : worker.culler.balls_with(cells, inserted_);
+        for (int i = 0; i < 64; ++i) {
+            if ((open >> i & 1u) != 0) finish_cell(worker, i, (came >> i & 1u) != 0, task, result);
+        }
+    }
+
+    void finish_cell(Worker& worker, int i, bool came, ivec3 task, TaskResult& result) {
+        const ivec3 cell = worker.cell[i];
+        const uint32_t old_word = old_ != nullptr ? old_->cells_.at(cell.x, cell.y, cell.z) : 0u;
+        const bool was = (old_word & kCellOccupied) != 0;
+        if (was && !came && !uses_removed(old_word & kCellSlotMask)) return;
+        worker.culler.emit(worker.cells, i, worker.code);
+        const ivec3 first = first_cell();
+        const ivec3 texel{(first.x + cell.x) * kBrickVoxels, (first.y + cell.y) * kBrickVoxels,
+                          (first.z + cell.z) * kBrickVoxels};
+        ++result.cells_evaluated;
+        const float least = worker.evaluator.evaluate(worker.code, texel);
+        if (!(least < options_.own_voxels * options_.voxel_size)) {
+            set_empty(cell, worker.evaluator.distances()[0] < 0, task, result);
+            return;
+        }
+        Leaf leaf{cell, uint32_t(result.code.size()), uint32_t(worker.code.size()), true, {}};
+        if (made_ != nullptr) leaf.content = worker.evaluator.content(options_.format);
+        result.code.insert(result.code.end(), worker.code.begin(), worker.code.end());
+        result.leaves.push_back(std::move(leaf));
+    }
+
+    bool uses_removed(uint32_t slot) const {
+        if (removed_.empty()) return false;
+        for (const sdf::Instruction in : old_->code_of(slot)) {
+            if (in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Constant) continue;
+            const uint32_t row = uint32_t(program_->params[in.param + 2]);
+            if (std::find(removed_.begin(), removed_.end(), row) != removed_.end()) return true;
         }
         return false;
     }
 
-    // Takes and gives slots in the order of cells, writes records, code and jobs.
-    Result<void> merge(const std::vector<TaskResult>& results) {
-        struct Entry {
-            Leaf leaf;
-            const Code* code;
-        };
-        std::vector<Entry> entries;
-        for (const TaskResult& result : results) {
-            for (const Leaf& leaf : result.leaves) entries.push_back({leaf, &result.code});
+    void set_empty(ivec3 cell, bool inside, ivec3 task, TaskResult& result) {
+        if (old_ == nullptr) {
+            if (!inside) return;
+            const ivec3 in = cell - task;
+            const ivec3 p{in.x / kCellPage, in.y / kCellPage, in.z / kCellPage};
+            Shared<CellMap::Words::Page>& page = result.pages[size_t((p.z * kTaskPages + p.y) * kTaskPages + p.x)];
+            if (!page) page.write().fill(uint32_t(kMaxJump));
+            page.write()[out_->cells_.index(cell.x, cell.y, cell.z) % CellMap::Words::kPageSize] =
+                kCellInside | uint32_t(kMaxJump);
+            return;
+        }
+        const uint32_t word = old_->cells_.at(cell.x, cell.y, cell.z);
+        if ((word & kCellOccupied) != 0) result.leaves.push_back({cell, 0, 0, false, {}});
+        if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside)
+            result.empties.push_back({cell, inside});
+    }
+
+    void occupancy_changed(ivec3 cell) {
+        for (size_t i = 0; i < dirty_.size(); ++i) {
+            if (!contains(dirty_[i], cell)) continue;
+            occupancy_changes_[i] = joined(occupancy_changes_[i], {cell, cell + ivec3{1, 1, 1}});
+            return;
+        }
+    }
+
+    // Takes and gives slots in the order of tasks and cells, writes words, records and code.
+    Result<void> merge() {
+        BrickPool& pool = out_->pool_;
+        size_t leaves = 0, code = 0;
+        for (const TaskResult& result : results_) {
+            leaves += result.leaves.size();
+            code += result.code.size();
             out_->stats_.cells_tested += result.cells_tested;
             out_->stats_.cells_evaluated += result.cells_evaluated;
         }
-        std::sort(entries.begin(), entries.end(),
-                  [](const Entry& a, const Entry& b) { return a.leaf.cell < b.leaf.cell; });
-
-        BrickPool pool(std::min(options_.max_bricks, kCellSlotMask + 1));
-        if (old_ != nullptr) {
-            out_->records_ = old_->records_;
-            out_->code_ = old_->code_;
-            std::vector<bool> used(old_->records_.size());
-            for (size_t slot = 0; slot < used.size(); ++slot) used[slot] = old_->records_[slot].code_count != 0;
-            pool.adopt(used);
+        if (old_ == nullptr) {
+            out_->code_.reserve(2 * code);
+            set_pages();
         }
-        const auto old_word = [&](uint64_t cell) { return old_ != nullptr ? old_->cells_[cell] : 0u; };
-        for (const Entry& entry : entries) {
-            if (entry.leaf.count != 0) continue;
-            const uint32_t slot = old_word(entry.leaf.cell) & kCellSlotMask;
-            pool.release(slot);
-            out_->records_[slot] = {};
-            ++out_->stats_.bricks_freed;
-        }
-        for (const TaskResult& result : results) {
-            for (const Moved& moved : result.moved) {
-                const BrickRecord& record = out_->records_[moved.slot];
-                std::copy_n(result.code.begin() + moved.first, record.code_count,
-                            out_->code_.begin() + record.code_first);
+        out_->jobs_.reserve(leaves);
+        if (made_ != nullptr) made_->reserve(leaves);
+        for (const TaskResult& result : results_) {
+            for (const Leaf& leaf : result.leaves) {
+                if (leaf.code_count != 0) continue;
+                const uint32_t slot = out_->cells_.at(leaf.cell.x, leaf.cell.y, leaf.cell.z) & kCellSlotMask;
+                out_->live_code_ -= out_->records_[slot].code_count;
+                pool.release(slot);
+                out_->records_.write(slot) = {};
+                ++out_->stats_.bricks_freed;
+                occupancy_changed(leaf.cell);
+            }
+            for (const Emptied& empty : result.empties) {
+                const uint32_t word = out_->cells_.at(empty.cell.x, empty.cell.y, empty.cell.z);
+                // The old jump may stay: update_jumps() rewrites every one that could differ.
+                out_->cells_.set(
+                    empty.cell.x, empty.cell.y, empty.cell.z,
+                    (empty.inside ? kCellInside : 0u) | ((word & kCellOccupied) != 0 ? uint32_t(kMaxJump) : word & 7u));
             }
         }
         const GridParams& g = out_->grid_;
-        for (const Entry& entry : entries) {
-            if (entry.leaf.count == 0) continue;
-            const uint64_t cell = entry.leaf.cell;
-            const uint32_t word = old_word(cell);
-            const uint32_t slot = (word & kCellOccupied) != 0 ? word & kCellSlotMask : pool.allocate();
-            if (slot == kNoSlot) continue;  // counted by the pool
-            if (slot >= out_->records_.size()) out_->records_.resize(slot + 1);
-            BrickRecord& record = out_->records_[slot];
-            const int x = int(cell % uint64_t(size_.x)), y = int(cell / uint64_t(size_.x) % uint64_t(size_.y)),
-                      z = int(cell / (uint64_t(size_.x) * uint64_t(size_.y)));
-            record.texel_x = (g.cell_x + x) * kBrickVoxels;
-            record.texel_y = (g.cell_y + y) * kBrickVoxels;
-            record.texel_z = (g.cell_z + z) * kBrickVoxels;
-            if (record.code_count != entry.leaf.count) {
-                record.code_first = uint32_t(out_->code_.size());
-                record.code_count = entry.leaf.count;
-                out_->code_.resize(out_->code_.size() + entry.leaf.count);
-            }
-            std::copy_n(entry.code->begin() + entry.leaf.first, entry.leaf.count,
-                        out_->code_.begin() + record.code_first);
-            out_->cells_[cell] = kCellOccupied | slot;
-            if (entry.leaf.bake) {
-                out_->jobs_.push_back(
-                    {slot, {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count});
+        for (TaskResult& result : results_) {
+            const uint32_t base = uint32_t(out_->code_.append(result.code));
+            for (Leaf& leaf : result.leaves) {
+                if (leaf.code_count == 0) continue;
+                const uint32_t word = out_->cells_.at(leaf.cell.x, leaf.cell.y, leaf.cell.z);
+                const bool had = (word & kCellOccupied) != 0;
+                const uint32_t slot = had ? word & kCellSlotMask : pool.allocate();
+                if (slot == kNoSlot) continue;  // counted by the pool
+                out_->records_.resize_pages(slot / Field::Records::kPageSize + 1);
+                BrickRecord& record = out_->records_.write(slot);
+                out_->live_code_ += uint64_t(leaf.code_count) - record.code_count;
+                record.texel_x = (g.cell_x + leaf.cell.x) * kBrickVoxels;
+                record.texel_y = (g.cell_y + leaf.cell.y) * kBrickVoxels;
+                record.texel_z = (g.cell_z + leaf.cell.z) * kBrickVoxels;
+                record.code_first = base + leaf.code_first;
+                record.code_count = leaf.code_count;
+                if (!had) {
+                    out_->cells_.set(leaf.cell.x, leaf.cell.y, leaf.cell.z, kCellOccupied | slot);
+                    occupancy_changed(leaf.cell);
+                }
+                out_->jobs_.push_back(slot);
+                if (made_ != nullptr) made_->emplace_back(slot, std::move(leaf.content));
             }
         }
         if (pool.refused() != 0) {
@@ -493,36 +524,40 @@ private:
         return {};
     }
 
-    // Code that no brick uses any more is dropped once it is the larger part.
-    void compact_code() {
-        uint64_t live = 0;
-        for (const BrickRecord& record : out_->records_) live += record.code_count;
-        if (out_->code_.size() <= 2 * live + 1024) return;
-        Code packed;
-        packed.reserve(live);
-        for (BrickRecord& record : out_->records_) {
-            const auto from = out_->code_.begin() + record.code_first;
-            record.code_first = uint32_t(packed.size());
-            packed.insert(packed.end(), from, from + record.code_count);
+    void set_pages() {
+        CellMap& cells = out_->cells_;
+        for (size_t t = 0; t < tasks_.size(); ++t) {
+            for (size_t i = 0; i < results_[t].pages.size(); ++i) {
+                Shared<CellMap::Words::Page>& page = results_[t].pages[i];
+                if (!page) continue;
+                const int p = int(i);
+                cells.words().set_page(cells.page_index(tasks_[t].x / kCellPage + p % kTaskPages,
+                                                        tasks_[t].y / kCellPage + p / kTaskPages % kTaskPages,
+                                                        tasks_[t].z / kCellPage + p / (kTaskPages * kTaskPages)),
+                                       std::move(page));
+            }
         }
-        out_->code_ = std::move(packed);
-        for (BrickJob& job : out_->jobs_) job.code_first = out_->records_[job.slot].code_first;
     }
 
-    void finish_jumps(const std::vector<TaskResult>& results) {
+    // Code that no brick uses any more is dropped once it is the larger part.
+    void compact_code() {
+        if (out_->code_.size() <= 2 * out_->live_code_ + 1024) return;
+        AppendArray<sdf::Instruction> packed;
+        packed.reserve(size_t(3 * out_->live_code_));
+        for (const uint32_t slot : out_->slots()) {
+            BrickRecord& record = out_->records_.write(slot);
+            record.code_first = uint32_t(packed.append(out_->code_.subspan(record.code_first, record.code_count)));
+        }
+        out_->code_ = std::move(packed);
+    }
+
+    void finish_jumps() {
         if (old_ == nullptr) {
-            update_jumps(out_->cells_, size_, {{0, 0, 0}, size_}, options_.workers);
+            update_jumps(out_->cells_, {{0, 0, 0}, size_});
             return;
         }
-        for (const TaskResult& result : results) {  // one box a task: the changes of one edit lie together
-            CellBox box{size_, {0, 0, 0}};
-            for (const uint64_t cell : result.occupancy_changes) {
-                const int x = int(cell % uint64_t(size_.x)), y = int(cell / uint64_t(size_.x) % uint64_t(size_.y)),
-                          z = int(cell / (uint64_t(size_.x) * uint64_t(size_.y)));
-                box = {{std::min(box.min.x, x), std::min(box.min.y, y), std::min(box.min.z, z)},
-                       {std::max(box.max.x, x + 1), std::max(box.max.y, y + 1), std::max(box.max.z, z + 1)}};
-            }
-            if (!box.empty()) update_jumps(out_->cells_, size_, grown(box, kMaxJump, size_), options_.workers);
+        for (const CellBox& box : occupancy_changes_) {
+            if (!box.empty()) update_jumps(out_->cells_, grown(box, kMaxJump, size_));
         }
     }
 
@@ -530,20 +565,33 @@ private:
     std::shared_ptr<const sdf::Program> program_;
     FieldOptions options_;
     std::shared_ptr<Field> out_;
-    std::span<const Box3> dirty_;
-    std::optional<CodeMatch> match_;
+    std::span<const RowChange> changes_;
+    MadeBricks* made_;
     ivec3 size_;
-    TaskResult upper_;  // what nodes above the tasks settled
+    float far_ = 0;
+    std::vector<CellBox> dirty_, occupancy_changes_;
+    std::vector<uint32_t> removed_, inserted_;
+    std::vector<ivec3> tasks_;
+    std::vector<TaskResult> results_;
 };
 
 Result<std::shared_ptr<const Field>> Field::build(std::shared_ptr<const sdf::Program> program,
-                                                  const FieldOptions& options) {
-    return FieldBuilder(nullptr, std::move(program), options, {}).run();
+                                                  const FieldOptions& options, MadeBricks* made) {
+    return FieldBuilder(nullptr, std::move(program), options, {}, made).run();
 }
 
 Result<std::shared_ptr<const Field>> Field::update(const Field& old, std::shared_ptr<const sdf::Program> program,
-                                                   std::span<const Box3> dirty) {
-    return FieldBuilder(&old, std::move(program), old.options_, dirty).run();
+                                                   std::span<const RowChange> changes, MadeBricks* made) {
+    return FieldBuilder(&old, std::move(program), old.options_, changes, made).run();
+}
+
+std::vector<uint32_t> Field::slots() const {
+    std::vector<uint32_t> out;
+    out.reserve(pool_.in_use());
+    for (uint32_t slot = 0; slot < slot_count(); ++slot) {
+        if (pool_.used(slot)) out.push_back(slot);
+    }
+    return out;
 }
 
 uint32_t Field::cell_word(int x, int y, int z) const {
@@ -551,7 +599,7 @@ uint32_t Field::cell_word(int x, int y, int z) const {
     y -= grid_.cell_y;
     z -= grid_.cell_z;
     if (x < 0 || y < 0 || z < 0 || x >= grid_.size_x || y >= grid_.size_y || z >= grid_.size_z) return 0;
-    return cells_[(size_t(z) * size_t(grid_.size_y) + size_t(y)) * size_t(grid_.size_x) + size_t(x)];
+    return cells_.at(x, y, z);
 }
 
 }  // namespace kiln::field

@@ -7,77 +7,23 @@
 #include "sdf/eval.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 
 namespace kiln::field {
 namespace {
 
-constexpr size_t kTexels = size_t(kBrickTexelCount);
-constexpr size_t kPalette = size_t(kPaletteSize);
-constexpr int kBakeGrain = 4;  // bricks a piece of work: one takes microseconds
+constexpr size_t kBakeGrain = 16;  // bricks a piece of work: one takes a microsecond
 
 size_t texel_at(int x, int y, int z) { return (size_t(z) * 8 + size_t(y)) * 8 + size_t(x); }
-
-// Distinct materials of a brick and how much of it they make up, in 510ths of a texel: whole numbers, so in any order.
-class PaletteBuilder {
-public:
-    void add(uint16_t id, uint32_t weight) {
-        for (Entry& entry : entries_) {
-            if (entry.id != id) continue;
-            entry.weight += weight;
-            return;
-        }
-        entries_.push_back({id, weight});
-    }
-
-    // The 16 heaviest, ties to the lower number, in ascending order; the number left out.
-    uint32_t finish(uint32_t* palette) {
-        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
-            return a.weight != b.weight ? a.weight > b.weight : a.id < b.id;
-        });
-        const uint32_t kept = uint32_t(std::min(entries_.size(), kPalette));
-        const uint16_t heaviest = entries_.empty() ? uint16_t(0) : entries_[0].id;
-        const uint32_t left_out = uint32_t(entries_.size()) - kept;
-        entries_.resize(kept);
-        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.id < b.id; });
-        for (uint32_t i = 0; i < kPalette; ++i) palette[i] = i < kept ? entries_[i].id : sdf::kNoMaterial;
-        heaviest_slot_ = std::max(slot_of(heaviest), 0);
-        return left_out;
-    }
-
-    int slot_of(uint16_t id) const {
-        for (size_t i = 0; i < entries_.size(); ++i) {
-            if (entries_[i].id == id) return int(i);
-        }
-        return -1;
-    }
-    int heaviest_slot() const { return heaviest_slot_; }
-    void clear() { entries_.clear(); }
-
-private:
-    struct Entry {
-        uint16_t id;
-        uint32_t weight;
-    };
-    std::vector<Entry> entries_;
-    int heaviest_slot_ = 0;
-};
 
 // The texts of march.gpu.h and surface.gpu.h, reading host bricks.
 struct Reader {
     const HostBricks& bricks;
-    std::span<const uint32_t> cells;
-    GridParams grid_params;
+    const CellMap& cells;
 
-    explicit Reader(const HostBricks& host)
-        : bricks(host), cells(host.field().cells()), grid_params(host.field().grid()) {}
+    explicit Reader(const HostBricks& host) : bricks(host), cells(host.field().cells()) {}
 
-    uint field_cell(ivec3 cell) const {
-        return cells[(size_t(cell.z) * size_t(grid_params.size_y) + size_t(cell.y)) * size_t(grid_params.size_x) +
-                     size_t(cell.x)];
-    }
+    uint field_cell(ivec3 cell) const { return cells.at(cell.x, cell.y, cell.z); }
     int field_slot(ivec3 cell) const {
         const uint32_t word = bricks.field().cell_word(cell.x, cell.y, cell.z);
         return (word & kCellOccupied) != 0 ? int(word & kCellSlotMask) : -1;
@@ -85,7 +31,7 @@ struct Reader {
     float field_texel(int slot, ivec3 texel) const { return bricks.texel(uint32_t(slot), texel.x, texel.y, texel.z); }
     Corners field_corners(int slot, ivec3 voxel) const { return bricks.corners(uint32_t(slot), voxel); }
     uint field_material(int slot, ivec3 texel) const {
-        return bricks.materials()[size_t(slot) * kTexels + texel_at(texel.x, texel.y, texel.z)];
+        return bricks.content(uint32_t(slot)).word(texel_at(texel.x, texel.y, texel.z));
     }
 
 #include "field/march.gpu.h"
@@ -102,128 +48,86 @@ int floor_div(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
 
 }  // namespace
 
-void bake_brick(const Field& field, const BrickJob& job, BrickTexels& out) {
-    const float h = field.grid().voxel_size;
-    const sdf::TapeView tape = sdf::view(field.program(), field.code().subspan(job.code_first, job.code_count));
-    thread_local std::vector<sdf::MaterialMix> mixes(kTexels);
-    thread_local std::vector<float> points(3 * kTexels);
-    float* const x = points.data();
-    float* const y = x + kTexels;
-    float* const z = y + kTexels;
-    for (int k = 0; k < kBrickTexels; ++k) {
-        for (int j = 0; j < kBrickTexels; ++j) {
-            for (int i = 0; i < kBrickTexels; ++i) {
-                const size_t at = texel_at(i, j, k);
-                x[at] = float(job.texel[0] + i) * h;  // never origin + i * h: neighbours must see the same position
-                y[at] = float(job.texel[1] + j) * h;
-                z[at] = float(job.texel[2] + k) * h;
-            }
-        }
-    }
-    sdf::evaluate_materials(tape, {x, y, z, kBrickTexelCount}, out.distance, mixes.data());
-
-    thread_local PaletteBuilder palette;
-    palette.clear();
-    const auto in_band = [&](size_t i) { return std::fabs(out.distance[i] / h) < kBandVoxels; };
-    const auto known = [](uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; };
-    for (size_t i = 0; i < kTexels; ++i) {
-        if (!in_band(i)) continue;
-        const uint32_t second = material_word(0, 0, mixes[i].weight) >> 8;
-        palette.add(known(mixes[i].id0), 510 - second);
-        if (second != 0) palette.add(known(mixes[i].id1), second);
-    }
-    out.dropped = palette.finish(out.palette);
-    for (size_t i = 0; i < kTexels; ++i) {
-        out.material[i] = 0;
-        if (!in_band(i)) continue;
-        const sdf::MaterialMix& mix = mixes[i];
-        int slot0 = palette.slot_of(known(mix.id0));
-        int slot1 = mix.weight > 0 ? palette.slot_of(known(mix.id1)) : slot0;
-        const bool both = slot0 >= 0 && slot1 >= 0;
-        if (slot0 < 0) slot0 = slot1 >= 0 ? slot1 : palette.heaviest_slot();
-        if (!both) slot1 = slot0;
-        out.material[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot1), both ? mix.weight : 0.0f));
-        if (out.material[i] >> 8 == 0)
-            out.material[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot0), 0.0f));
-    }
+Result<HostBricks> HostBricks::build(std::shared_ptr<const sdf::Program> program, const FieldOptions& options) {
+    MadeBricks made;
+    auto field = Field::build(std::move(program), options, &made);
+    if (!field) return field.error();
+    HostBricks out;
+    out.field_ = std::move(*field);
+    out.take(made);
+    return out;
 }
 
 HostBricks HostBricks::bake(std::shared_ptr<const Field> field, int workers) {
     HostBricks out;
     out.field_ = std::move(field);
-    std::vector<BrickJob> jobs;
-    const std::span<const BrickRecord> records = out.field_->records();
-    for (uint32_t slot = 0; slot < records.size(); ++slot) {
-        const BrickRecord& r = records[slot];
-        if (r.code_count != 0) jobs.push_back({slot, {r.texel_x, r.texel_y, r.texel_z}, r.code_first, r.code_count});
-    }
-    out.bake_jobs(jobs, workers);
+    out.bake_slots(out.field_->slots(), workers);
     return out;
 }
 
-void HostBricks::update(std::shared_ptr<const Field> next, int workers) {
+void HostBricks::update(std::shared_ptr<const Field> next, int workers, MadeBricks* made) {
     if (!field_ || next->parent_revision() != field_->revision()) {
         *this = bake(std::move(next), workers);
         return;
     }
     field_ = std::move(next);
-    bake_jobs(field_->jobs(), workers);
-    for (size_t slot = 0; slot < dropped_.size(); ++slot) {
-        if (field_->records()[slot].code_count == 0) dropped_[slot] = 0;
-    }
-}
-
-void HostBricks::bake_jobs(std::span<const BrickJob> jobs, int workers) {
-    KILN_PROFILE("host bake");
-    const size_t slots = field_->slot_count();
-    distances_.resize(slots * kTexels * size_t(texel_bytes()));
-    materials_.resize(slots * kTexels);
-    palettes_.resize(slots * kPalette, sdf::kNoMaterial);
-    dropped_.resize(slots);
-    parallel_for(
-        jobs.size(), workers,
-        [&](int i) {
-            BrickTexels texels;
-            bake_brick(*field_, jobs[size_t(i)], texels);
-            store(jobs[size_t(i)], texels);
-        },
-        kBakeGrain);
-}
-
-void HostBricks::store(const BrickJob& job, const BrickTexels& texels) {
-    const float h = field_->grid().voxel_size;
-    const size_t first = size_t(job.slot) * kTexels;
-    if (texel_bytes() == 2) {
-        std::array<uint16_t, kTexels> codes;
-        for (size_t i = 0; i < kTexels; ++i) codes[i] = uint16_t(half_code(texels.distance[i] / h));
-        std::memcpy(distances_.data() + first * 2, codes.data(), sizeof codes);
+    if (made != nullptr) {
+        take(*made);
     } else {
-        for (size_t i = 0; i < kTexels; ++i) distances_[first + i] = std::byte(snorm8_code(texels.distance[i] / h));
+        bake_slots(field_->jobs(), workers);
     }
-    std::copy_n(texels.material, kTexels, materials_.begin() + ptrdiff_t(first));
-    std::copy_n(texels.palette, kPalette, palettes_.begin() + ptrdiff_t(size_t(job.slot) * kPalette));
-    dropped_[job.slot] = texels.dropped;
+}
+
+Result<void> HostBricks::update(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes) {
+    MadeBricks made;
+    auto next = Field::update(*field_, std::move(program), changes, &made);
+    if (!next) return next.error();
+    update(std::move(*next), 0, &made);
+    return {};
+}
+
+void HostBricks::take(MadeBricks& made) {
+    contents_.resize_pages(field_->slot_count() / Contents::kPageSize + 1);
+    for (auto& [slot, content] : made) contents_.write(slot) = std::move(content);
+}
+
+void HostBricks::bake_slots(std::span<const uint32_t> slots, int workers) {
+    KILN_PROFILE("host bake");
+    MadeBricks made(slots.size());
+    parallel_for((slots.size() + kBakeGrain - 1) / kBakeGrain, workers, [&](int piece) {
+        BrickEvaluator evaluator(field_->program(), field_->options().voxel_size);
+        const size_t first = size_t(piece) * kBakeGrain;
+        for (size_t i = first; i < std::min(first + kBakeGrain, slots.size()); ++i) {
+            const BrickRecord& record = field_->records()[slots[i]];
+            evaluator.evaluate(field_->code_of(slots[i]), {record.texel_x, record.texel_y, record.texel_z});
+            made[i] = {slots[i], evaluator.content(field_->options().format)};
+        }
+    });
+    take(made);
 }
 
 uint64_t HostBricks::dropped_materials() const {
     uint64_t sum = 0;
-    for (const uint32_t dropped : dropped_) sum += dropped;
+    for (const uint32_t slot : field_->slots()) sum += content(slot).dropped();
     return sum;
 }
 
-float HostBricks::texel(uint32_t slot, int x, int y, int z) const {
-    const size_t at = size_t(slot) * kTexels + texel_at(x, y, z);
-    if (texel_bytes() == 1) return snorm8_value(uint32_t(distances_[at]));
-    uint16_t code;
-    std::memcpy(&code, distances_.data() + at * 2, 2);
-    return half_value(code);
+uint64_t HostBricks::bytes() const {
+    uint64_t sum = 0;
+    for (const uint32_t slot : field_->slots()) {
+        const BrickContent& brick = content(slot);
+        sum += (brick.half ? sizeof(HalfCodes) : sizeof(ByteCodes)) + (brick.materials ? sizeof(BrickMaterials) : 0);
+    }
+    return sum;
 }
 
+float HostBricks::texel(uint32_t slot, int x, int y, int z) const { return content(slot).distance(texel_at(x, y, z)); }
+
 Corners HostBricks::corners(uint32_t slot, ivec3 v) const {
-    return {texel(slot, v.x, v.y, v.z),         texel(slot, v.x + 1, v.y, v.z),
-            texel(slot, v.x, v.y + 1, v.z),     texel(slot, v.x + 1, v.y + 1, v.z),
-            texel(slot, v.x, v.y, v.z + 1),     texel(slot, v.x + 1, v.y, v.z + 1),
-            texel(slot, v.x, v.y + 1, v.z + 1), texel(slot, v.x + 1, v.y + 1, v.z + 1)};
+    const BrickContent& brick = content(slot);
+    const size_t at = texel_at(v.x, v.y, v.z);
+    return {brick.distance(at),      brick.distance(at + 1),  brick.distance(at + 8),  brick.distance(at + 9),
+            brick.distance(at + 64), brick.distance(at + 65), brick.distance(at + 72), brick.distance(at + 73)};
 }
 
 vec3 HostBricks::gradient(uint32_t slot, ivec3 cell, vec3 p, NormalKind kind) const {
@@ -244,9 +148,8 @@ void HostBricks::surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, Norm
     out.normal = unit(gradient(slot, cell, in_brick, kind));
     Reader reader(*this);
     const Reader::SurfaceMaterial material = reader.surface_material(int(slot), voxel, p);
-    const uint32_t* palette = palettes_.data() + size_t(slot) * kPalette;
-    out.material0 = uint16_t(palette[material.slot0]);
-    out.material1 = uint16_t(palette[material.slot1]);
+    out.material0 = uint16_t(content(slot).palette(material.slot0));
+    out.material1 = uint16_t(content(slot).palette(material.slot1));
     out.share = material.share;
     out.from_brick = true;
 }
@@ -316,16 +219,24 @@ HostBricks::Hit HostBricks::cast(dvec3 origin_world, vec3 direction, double t_ma
 
 uint64_t HostBricks::hash() const {
     uint64_t sum = 0;
-    for (const uint32_t word : field_->cells()) {
-        if ((word & kCellOccupied) == 0) {
-            sum = hash_combine(sum, word);
-            continue;
+    const ivec3 size = field_->cells().size();
+    for (int z = 0; z < size.z; ++z) {
+        for (int y = 0; y < size.y; ++y) {
+            for (int x = 0; x < size.x; ++x) {
+                const uint32_t word = field_->cells().at(x, y, z);
+                if ((word & kCellOccupied) == 0) {
+                    sum = hash_combine(sum, word);
+                    continue;
+                }
+                const BrickContent& brick = content(word & kCellSlotMask);
+                sum = hash_combine(sum, brick.half ? hash64_of(std::span<const uint16_t>(*brick.half))
+                                                   : hash64_of(std::span<const uint8_t>(*brick.bytes)));
+                sum = hash_combine(sum, brick.material);
+                if (!brick.materials) continue;
+                sum = hash_combine(sum, hash64_of(std::span<const uint16_t>(brick.materials->words)));
+                sum = hash_combine(sum, hash64_of(std::span<const uint32_t>(brick.materials->palette)));
+            }
         }
-        const size_t slot = word & kCellSlotMask;
-        const size_t texels = kTexels * size_t(texel_bytes());
-        sum = hash_combine(sum, hash64(std::span(distances_).subspan(slot * texels, texels)));
-        sum = hash_combine(sum, hash64_of(std::span<const uint16_t>(materials_).subspan(slot * kTexels, kTexels)));
-        sum = hash_combine(sum, hash64_of(std::span<const uint32_t>(palettes_).subspan(slot * kPalette, kPalette)));
     }
     return sum;
 }

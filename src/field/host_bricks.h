@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Host bricks: the texels of a field's bricks in ordinary memory, baked on the CPU from the same jobs as the GPU's, and questions
-// answered from them. Reading is for any thread; update() is the owner's.
-//
-// Layout, by slot: 512 distance codes (2 bytes: half_code(); 1 byte: snorm8_code()) and 512 material words (2 bytes), x fastest,
-// then y, then z; 16 palette entries (4 bytes), ascending material numbers, the unused ones kNoMaterial.
-// Material words are those of codes.gpu.h; texels outside the band (|d| >= 4 voxels) hold 0: no surface ever asks them.
+// Host bricks: the texels of a field's bricks in ordinary memory, and questions answered from them. A value: a copy is cheap and shares every
+// brick that did not change, so a snapshot is kept by copying. Reading is for any thread; update() is the owner's.
 #pragma once
 
 #include "field/codes.gpu.h"
 #include "field/cubic.gpu.h"
 #include "field/field.h"
 
-#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -22,32 +17,26 @@ namespace kiln::field {
 /// How a normal is made from texels.
 enum class NormalKind : uint8_t { Dual, Central, Tetrahedral };
 
-/// What a brick's texels are, before anything is packed.
-struct BrickTexels {
-    float distance[kBrickTexelCount];     ///< metres, not clamped
-    uint16_t material[kBrickTexelCount];  ///< words
-    uint32_t palette[kPaletteSize];
-    uint32_t dropped;  ///< materials that found no place in the palette
-};
-
-/// Evaluates one job. Any thread.
-void bake_brick(const Field& field, const BrickJob& job, BrickTexels& out);
-
 class HostBricks {
 public:
+    /// Builds a field and its bricks in one go.
+    static Result<HostBricks> build(std::shared_ptr<const sdf::Program> program, const FieldOptions& options);
     /// All bricks of `field`, on `workers` threads (0: all cores).
     static HostBricks bake(std::shared_ptr<const Field> field, int workers = 0);
-    /// Brings it to `next`: only next's jobs where it was made from this field, else everything.
-    void update(std::shared_ptr<const Field> next, int workers = 0);
+    /// Brings it to `next`: only next's jobs where it was made from this field, else everything. `made`: those jobs' texels, where the
+    /// maker of `next` has them already.
+    void update(std::shared_ptr<const Field> next, int workers = 0, MadeBricks* made = nullptr);
+    /// Brings field and bricks to `program`, which is this field's with `changes` made; see Field::update. Unchanged on failure.
+    Result<void> update(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes);
 
     const Field& field() const { return *field_; }
-    int texel_bytes() const { return field_->options().format == DistanceFormat::Half ? 2 : 1; }
-    std::span<const std::byte> distances() const { return distances_; }
-    std::span<const uint16_t> materials() const { return materials_; }
-    std::span<const uint32_t> palettes() const { return palettes_; }
+    const std::shared_ptr<const Field>& shared_field() const { return field_; }
+    /// Of a slot in use.
+    const BrickContent& content(uint32_t slot) const { return contents_[slot]; }
     /// Materials that found no place in the 16 entries of a brick's palette, over all bricks.
     uint64_t dropped_materials() const;
-    uint64_t bytes() const { return distances_.size() + materials_.size() * 2 + palettes_.size() * 4; }
+    /// Of texels and palettes, shared ones too.
+    uint64_t bytes() const;
 
     /// Stored value of a texel (0 … 7 an axis), voxels.
     float texel(uint32_t slot, int x, int y, int z) const;
@@ -81,15 +70,13 @@ public:
     uint64_t hash() const;
 
 private:
-    void store(const BrickJob& job, const BrickTexels& texels);
-    void bake_jobs(std::span<const BrickJob> jobs, int workers);
+    using Contents = PagedArray<BrickContent, 64>;
+    void take(MadeBricks& made);
+    void bake_slots(std::span<const uint32_t> slots, int workers);
     void surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, NormalKind kind, Sample& out) const;
 
     std::shared_ptr<const Field> field_;
-    std::vector<std::byte> distances_;
-    std::vector<uint16_t> materials_;
-    std::vector<uint32_t> palettes_;
-    std::vector<uint32_t> dropped_;  // by slot
+    Contents contents_;  // by slot
 };
 
 /// A world position as whole and fractional texel coordinates.

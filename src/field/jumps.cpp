@@ -1,29 +1,63 @@
 // SPDX-License-Identifier: MIT
-// max(|dx|, |dy|, |dz|) is separable: the least over x first, then over y of max(|dy|, that), then over z likewise.
+// Occupancy as one bit a cell: cells within k of a brick are the occupied ones dilated k times by one cell, an axis at a time, 64 cells an
+// operation. What the k-th dilation adds has jump k.
 
 #include "field/jumps.h"
 
-#include "base/parallel_for.h"
-
 #include <algorithm>
-#include <cstdlib>
+#include <array>
 #include <vector>
 
 namespace kiln::field {
 namespace {
 
-// out[i] = least over j in [0, count) with |i − j| < kMaxJump of max(|i − j|, in[j * stride]), at most kMaxJump.
-void least_along(const uint8_t* in, uint8_t* out, int count, size_t stride) {
-    for (int i = 0; i < count; ++i) {
-        int best = kMaxJump;
-        for (int step = 0; step < best; ++step) {
-            const int before = i - step >= 0 ? in[size_t(i - step) * stride] : kMaxJump;
-            const int after = i + step < count ? in[size_t(i + step) * stride] : kMaxJump;
-            best = std::min(best, std::max(step, std::min(before, after)));
+// Bits of a box of cells; rows along x begin at multiples of kCellPage, so that a page's row of cells is one byte.
+struct BitBox {
+    ivec3 size;
+    size_t row_words;
+    std::vector<uint64_t> words;
+
+    explicit BitBox(ivec3 s)
+        : size(s), row_words((size_t(s.x) + 63) / 64), words(row_words * size_t(s.y) * size_t(s.z)) {}
+    uint64_t* row(int y, int z) { return words.data() + (size_t(z) * size_t(size.y) + size_t(y)) * row_words; }
+    uint8_t byte(int x8, int y, int z) { return uint8_t(row(y, z)[size_t(x8) / 8] >> (x8 % 8 * 8)); }
+};
+
+// from dilated by one cell into `to`; `between` is scratch of the same shape.
+void dilate(const BitBox& from, BitBox& between, BitBox& to) {
+    const size_t w = from.row_words, plane = w * size_t(from.size.y), n = from.words.size();
+    for (size_t i = 0; i < n; ++i) {
+        const uint64_t here = from.words[i];
+        uint64_t near = here | here << 1 | here >> 1;
+        if (i % w > 0) near |= from.words[i - 1] >> 63;
+        if (i % w + 1 < w) near |= from.words[i + 1] << 63;
+        to.words[i] = near;
+    }
+    for (int z = 0; z < from.size.z; ++z) {
+        for (size_t i = 0; i < plane; ++i) {
+            const size_t at = size_t(z) * plane + i;
+            uint64_t near = to.words[at];
+            if (i >= w) near |= to.words[at - w];
+            if (i + w < plane) near |= to.words[at + w];
+            between.words[at] = near;
         }
-        out[size_t(i) * stride] = uint8_t(best);
+    }
+    for (size_t i = 0; i < n; ++i) {
+        uint64_t near = between.words[i];
+        if (i >= plane) near |= between.words[i - plane];
+        if (i + plane < n) near |= between.words[i + plane];
+        to.words[i] = near;
     }
 }
+
+// Word k of entry b is bit k of b.
+constexpr auto kSpread = [] {
+    std::array<std::array<uint32_t, kCellPage>, 256> out{};
+    for (uint32_t b = 0; b < 256; ++b) {
+        for (uint32_t k = 0; k < uint32_t(kCellPage); ++k) out[b][k] = (b >> k) & 1u;
+    }
+    return out;
+}();
 
 }  // namespace
 
@@ -33,41 +67,70 @@ CellBox grown(const CellBox& box, int by, ivec3 grid_size) {
              std::min(box.max.z + by, grid_size.z)}};
 }
 
-void update_jumps(std::span<uint32_t> cells, ivec3 grid_size, const CellBox& box, int workers) {
+CellBox joined(const CellBox& a, const CellBox& b) {
+    if (a.empty()) return b;
+    if (b.empty()) return a;
+    return {{std::min(a.min.x, b.min.x), std::min(a.min.y, b.min.y), std::min(a.min.z, b.min.z)},
+            {std::max(a.max.x, b.max.x), std::max(a.max.y, b.max.y), std::max(a.max.z, b.max.z)}};
+}
+
+void update_jumps(CellMap& cells, const CellBox& box) {
     if (box.empty()) return;
-    const CellBox wide = grown(box, kMaxJump, grid_size);
+    CellBox wide = grown(box, kMaxJump, cells.size());
+    wide.min.x &= ~(kCellPage - 1);
     const ivec3 size = wide.max - wide.min;
-    const size_t row = size_t(size.x), slab = row * size_t(size.y);
-    const auto cell_index = [&](int x, int y, int z) {
-        return (size_t(wide.min.z + z) * size_t(grid_size.y) + size_t(wide.min.y + y)) * size_t(grid_size.x) +
-               size_t(wide.min.x + x);
-    };
-    std::vector<uint8_t> a(slab * size_t(size.z)), b(a.size());
-    parallel_for(size.z, workers, [&](int z) {
-        uint8_t* from = a.data() + size_t(z) * slab;
-        uint8_t* to = b.data() + size_t(z) * slab;
+    BitBox occupied(size), near(size), next(size), between(size);
+    for (int z = 0; z < size.z; ++z) {
         for (int y = 0; y < size.y; ++y) {
-            for (int x = 0; x < size.x; ++x) {
-                from[size_t(y) * row + size_t(x)] =
-                    (cells[cell_index(x, y, z)] & kCellOccupied) != 0 ? 0 : uint8_t(kMaxJump);
+            for (int x8 = 0; x8 * kCellPage < size.x; ++x8) {
+                const int cx = wide.min.x + x8 * kCellPage, cy = wide.min.y + y, cz = wide.min.z + z;
+                const auto* page = cells.words().find(cells.page_index(cx / kCellPage, cy / kCellPage, cz / kCellPage));
+                if (page == nullptr) continue;
+                const uint32_t* words = page->data() + cells.index(cx, cy, cz) % page->size();
+                uint64_t byte = 0;
+                for (int k = 0; k < kCellPage; ++k) byte |= uint64_t(words[k] >> 31) << k;
+                occupied.row(y, z)[size_t(x8) / 8] |= byte << (x8 % 8 * 8);
             }
-            least_along(from + size_t(y) * row, to + size_t(y) * row, size.x, 1);
         }
-        for (int x = 0; x < size.x; ++x) least_along(to + x, from + x, size.y, row);
-    });
-    parallel_for(size.y, workers, [&](int y) {
-        for (int x = 0; x < size.x; ++x) {
-            const size_t at = size_t(y) * row + size_t(x);
-            least_along(a.data() + at, b.data() + at, size.z, slab);
+    }
+    // The jump's three bits, 7 until a dilation arrives.
+    std::array<BitBox, 3> jump{near, near, near};
+    for (BitBox& plane : jump) std::fill(plane.words.begin(), plane.words.end(), ~uint64_t(0));
+    near = occupied;
+    for (uint32_t k = 1; k < uint32_t(kMaxJump); ++k) {
+        dilate(near, between, next);
+        for (size_t i = 0; i < next.words.size(); ++i) {
+            const uint64_t arrived = next.words[i] & ~near.words[i];
+            for (uint32_t bit = 0; bit < 3; ++bit) {
+                if ((k >> bit & 1u) == 0) jump[bit].words[i] &= ~arrived;
+            }
         }
-    });
+        std::swap(near, next);
+    }
     for (int z = box.min.z; z < box.max.z; ++z) {
         for (int y = box.min.y; y < box.max.y; ++y) {
-            for (int x = box.min.x; x < box.max.x; ++x) {
-                const ivec3 local = ivec3{x, y, z} - wide.min;
-                uint32_t& word = cells[cell_index(local.x, local.y, local.z)];
-                if ((word & kCellOccupied) != 0) continue;
-                word = (word & kCellInside) | b[size_t(local.z) * slab + size_t(local.y) * row + size_t(local.x)];
+            for (int x8 = (box.min.x - wide.min.x) / kCellPage; wide.min.x + x8 * kCellPage < box.max.x; ++x8) {
+                const int cx = wide.min.x + x8 * kCellPage, ly = y - wide.min.y, lz = z - wide.min.z;
+                const size_t page = cells.page_index(cx / kCellPage, y / kCellPage, z / kCellPage);
+                const size_t at = cells.index(cx, y, z) % CellMap::Words::kPageSize;
+                std::array<uint32_t, kCellPage> had, wanted;
+                if (const auto* old = cells.words().find(page)) {
+                    std::copy_n(old->data() + at, had.size(), had.begin());
+                } else {
+                    had.fill(uint32_t(kMaxJump));
+                }
+                const auto& low = kSpread[jump[0].byte(x8, ly, lz)];
+                const auto& middle = kSpread[jump[1].byte(x8, ly, lz)];
+                const auto& high = kSpread[jump[2].byte(x8, ly, lz)];
+                for (size_t k = 0; k < had.size(); ++k) {
+                    const uint32_t empty = (had[k] & kCellInside) | low[k] | middle[k] << 1 | high[k] << 2;
+                    wanted[k] = (had[k] & kCellOccupied) != 0 ? had[k] : empty;
+                }
+                for (int x = cx; x < box.min.x; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
+                for (int x = std::max(box.max.x, cx); x < cx + kCellPage; ++x)
+                    wanted[size_t(x - cx)] = had[size_t(x - cx)];
+                if (wanted != had)
+                    std::copy(wanted.begin(), wanted.end(), cells.words().write_page(page).begin() + ptrdiff_t(at));
             }
         }
     }

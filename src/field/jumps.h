@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Jumps of empty cells: how many cells a ray may skip. A pure function of which cells own bricks.
+// The brick map: one word a cell, in pages of 8x8x8 cells that snapshots share, and the jumps of empty cells: how many cells a ray may
+// skip, a pure function of which cells own bricks.
 #pragma once
 
+#include "base/paged_array.h"
 #include "field/brick.gpu.h"
 
 #include <cstdint>
-#include <span>
 
 namespace kiln::field {
 
@@ -17,11 +18,45 @@ struct CellBox {
 
 /// Cells of `box` grown by `by` and cut to the grid.
 CellBox grown(const CellBox& box, int by, ivec3 grid_size);
+/// The smallest box with both.
+CellBox joined(const CellBox& a, const CellBox& b);
+
+/// Cell words by position, counted from the grid's first cell. Cells that were never written are empty, outside, and far from bricks.
+class CellMap {
+public:
+    using Words = PagedArray<uint32_t, kCellPage * kCellPage * kCellPage>;
+
+    CellMap() : words_(uint32_t(kMaxJump)) {}
+    explicit CellMap(ivec3 size) : CellMap() {
+        size_ = size;
+        pages_ = {pages_along(size.x), pages_along(size.y), pages_along(size.z)};
+        words_.resize_pages(size_t(pages_.x) * size_t(pages_.y) * size_t(pages_.z));
+    }
+    static int pages_along(int cells) { return (cells + kCellPage - 1) / kCellPage; }
+
+    ivec3 size() const { return size_; }
+    ivec3 pages() const { return pages_; }
+    size_t page_index(int x, int y, int z) const {
+        return (size_t(z) * size_t(pages_.y) + size_t(y)) * size_t(pages_.x) + size_t(x);
+    }
+    size_t index(int x, int y, int z) const { return size_t(cell_word_index(x, y, z, pages_.x, pages_.y)); }
+    uint32_t at(int x, int y, int z) const { return words_[index(x, y, z)]; }
+    void set(int x, int y, int z, uint32_t word) {
+        const size_t i = index(x, y, z);
+        if (words_[i] != word) words_.write(i) = word;
+    }
+    const Words& words() const { return words_; }
+    Words& words() { return words_; }
+
+private:
+    ivec3 size_, pages_;
+    Words words_;
+};
 
 /// Rewrites the jump of every empty cell in `box`: the Chebyshev distance to the nearest occupied cell of the whole grid, at most
 /// kMaxJump (also where there is none). All cells of such a cube around an empty cell but its shell are empty; neighbouring empty
 /// cells share a face of texels, on which every value is at least a voxel from 0, and no two neighbouring texels differ by
-/// two voxels: so they all have one sign.
-void update_jumps(std::span<uint32_t> cells, ivec3 grid_size, const CellBox& box, int workers);
+/// two voxels: so they all have one sign. Writes only words that differ.
+void update_jumps(CellMap& cells, const CellBox& box);
 
 }  // namespace kiln::field

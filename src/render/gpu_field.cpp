@@ -5,7 +5,7 @@
 #include "base/format.h"
 #include "base/log.h"
 #include "base/parallel_for.h"
-#include "field/host_bricks.h"
+#include "field/brick_content.h"
 #include "render/graph_runner.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/passes.h"
@@ -106,6 +106,49 @@ Result<void> GpuField::store(Storage& storage, std::string_view name, std::span<
     return write(storage, 0, bytes, kept ? old : std::span<const std::byte>{});
 }
 
+// Pages that are not those of `old`, runs of them in one write.
+template <typename T, size_t kPage>
+Result<void> GpuField::store_pages(Storage& storage, std::string_view name, const PagedArray<T, kPage>& pages,
+                                   const PagedArray<T, kPage>* old) {
+    bool kept = false;
+    if (auto r = reserve(storage, name, pages.size() * sizeof(T), kept); !r) return r;
+    std::vector<T> run;
+    for (size_t page = 0, first = 0; page <= pages.pages(); ++page) {
+        const bool ends = page == pages.pages() || (kept && old != nullptr && pages.same_page(*old, page)) ||
+                          run.size() * sizeof(T) >= kCompareBlock;
+        if (ends && !run.empty()) {
+            if (auto r = device_->write_buffer(storage.handle, first * kPage * sizeof(T), bytes_of(run)); !r) return r;
+            run.clear();
+        }
+        if (page == pages.pages() || (kept && old != nullptr && pages.same_page(*old, page))) continue;
+        if (run.empty()) first = page;
+        if (const auto* content = pages.find(page)) {
+            run.insert(run.end(), content->begin(), content->end());
+        } else {
+            run.insert(run.end(), kPage, pages.fill());
+        }
+    }
+    return {};
+}
+
+// What `array` has grown by since `old`, or all of it.
+template <typename T>
+Result<void> GpuField::write_grown(const Storage& storage, uint64_t offset, const AppendArray<T>& array,
+                                   const AppendArray<T>* old) {
+    const size_t from = old != nullptr && array.extends(*old) ? old->size() : 0;
+    if (from == array.size()) return {};
+    return device_->write_buffer(storage.handle, offset + from * sizeof(T),
+                                 bytes_of(array.subspan(from, array.size() - from)));
+}
+
+template <typename T>
+Result<void> GpuField::store_grown(Storage& storage, std::string_view name, const AppendArray<T>& array,
+                                   const AppendArray<T>* old) {
+    bool kept = false;
+    if (auto r = reserve(storage, name, array.size() * sizeof(T), kept); !r) return r;
+    return write_grown(storage, 0, array, kept ? old : nullptr);
+}
+
 void GpuField::drop_atlas() {
     for (rhi::TextureHandle* t : {&distances_, &materials_}) {
         if (!*t) continue;
@@ -172,10 +215,14 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
     bool adds = false;
     bool concave = true;
-    for (const sdf::EditSpan& edit : program.edits) {
-        if (edit.count == 0 || (edit.bounds.finite() && edit.op != Op::Intersect)) continue;
+    std::vector<uint32_t> rows;
+    program.index.everywhere(rows);
+    std::sort(rows.begin(), rows.end(),
+              [&](uint32_t a, uint32_t b) { return program.edits[a].order < program.edits[b].order; });
+    for (const uint32_t row : rows) {
+        const sdf::EditSpan& edit = program.edits[row];
         adds = adds || edit.op == Op::Union;
-        const auto code = std::span(program.code).subspan(edit.first, edit.count);
+        const auto code = program.code.subspan(edit.first, edit.count);
         out.insert(out.end(), code.begin(), code.end());
         if (edit.op == Op::Paint) continue;         // changes no distance
         concave = concave && edit.op == Op::Union;  // the smooth minimum of concave functions is concave
@@ -211,11 +258,8 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
         field_.reset();  // what the buffers hold is not known any more
         return error;
     };
-    auto old_bytes = [&old](auto member) { return old ? bytes_of(member(*old)) : std::span<const std::byte>{}; };
-    const auto cells = [](const field::Field& f) { return f.cells(); };
-    const auto records = [](const field::Field& f) { return f.records(); };
-    const auto code = [](const field::Field& f) { return f.code(); };
-    std::vector<sdf::Instruction> programs = next->program().code;
+    const std::span<const sdf::Instruction> tape = next->program().tape();
+    std::vector<sdf::Instruction> programs(tape.begin(), tape.end());
     program_count_ = uint32_t(programs.size());
     const std::vector<sdf::Instruction> outside = outside_code();
     if (device_->info().kind == rhi::DeviceKind::Cpu) {
@@ -227,22 +271,23 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     outside_count_ = uint32_t(outside.size());
     programs.insert(programs.end(), outside.begin(), outside.end());
 
-    if (auto r = store(cells_, "cells", bytes_of(next->cells()), old_bytes(cells)); !r) return fail(r.error());
-    if (auto r = store(records_, "records", bytes_of(next->records()), old_bytes(records)); !r) return fail(r.error());
-    if (auto r = store(code_, "code", bytes_of(next->code()), old_bytes(code)); !r) return fail(r.error());
+    if (auto r = store_pages(cells_, "cells", next->cells().words(), old ? &old->cells().words() : nullptr); !r)
+        return fail(r.error());
+    if (auto r = store_pages(records_, "records", next->records(), old ? &old->records() : nullptr); !r)
+        return fail(r.error());
+    if (auto r = store_grown(code_, "code", next->code(), old ? &old->code() : nullptr); !r) return fail(r.error());
     if (auto r = store(program_, "program", bytes_of(programs), bytes_of(program_code_)); !r) return fail(r.error());
     program_code_ = std::move(programs);
-    const std::vector<float>& new_samples = next->program().samples;
-    const std::vector<float>& new_params = next->program().params;
+    const auto& new_samples = next->program().samples;
+    const auto& new_params = next->program().params;
     bool kept = false;
     if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r)
         return fail(r.error());
     kept = kept && old && old->program().samples.size() == new_samples.size();
     const uint64_t params_at = new_samples.size() * sizeof(float);
-    const std::span<const std::byte> nothing;
-    if (auto r = write(numbers_, 0, bytes_of(new_samples), kept ? bytes_of(old->program().samples) : nothing); !r)
+    if (auto r = write_grown(numbers_, 0, new_samples, kept ? &old->program().samples : nullptr); !r)
         return fail(r.error());
-    if (auto r = write(numbers_, params_at, bytes_of(new_params), kept ? bytes_of(old->program().params) : nothing); !r)
+    if (auto r = write_grown(numbers_, params_at, new_params, kept ? &old->program().params : nullptr); !r)
         return fail(r.error());
     if (!dropped_) {
         auto buffer = device_->create_buffer({.size = 16, .label = "dropped materials"});
@@ -265,11 +310,9 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
 
     std::vector<uint32_t> slots;
     if (grown_from_here) {
-        for (const field::BrickJob& job : next->jobs()) slots.push_back(job.slot);
+        slots.assign(next->jobs().begin(), next->jobs().end());
     } else {
-        for (uint32_t slot = 0; slot < next->slot_count(); ++slot) {
-            if (next->records()[slot].code_count != 0) slots.push_back(slot);
-        }
+        slots = next->slots();
     }
     std::sort(slots.begin(), slots.end());
     if (auto r = baker == Baker::Host ? bake_on_host(slots) : bake(slots); !r) return fail(r.error());
@@ -310,9 +353,7 @@ Result<void> GpuField::bake(std::span<const uint32_t> slots) {
 Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
     bricks_baked_ = uint32_t(slots.size());
     const auto start = std::chrono::steady_clock::now();
-    const bool half = format_ == rhi::Format::R16Float;
     const size_t code_bytes = rhi::bytes_per_texel(format_);
-    const float voxels_per_metre = 1.0f / field_->grid().voxel_size;
     for (size_t at = 0; at < slots.size(); at += kJobsPerSlice) {
         const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
         std::vector<std::byte> codes(packed_bytes(slice.size(), 8 * code_bytes));
@@ -321,21 +362,19 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
         parallel_for(int(slice.size()), field_->options().workers, [&](int i) {
             const size_t job = size_t(i);
             const field::BrickRecord& record = field_->records()[slice[job]];
-            field::BrickTexels texels;
-            field::bake_brick(
-                *field_,
-                {slice[job], {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count},
-                texels);
+            field::BrickEvaluator evaluator(field_->program(), field_->options().voxel_size);
+            evaluator.evaluate(field_->code_of(slice[job]), {record.texel_x, record.texel_y, record.texel_z});
+            const field::BrickContent brick = evaluator.content(field_->options().format);
+            const auto* const from = brick.half ? reinterpret_cast<const std::byte*>(brick.half->data())
+                                                : reinterpret_cast<const std::byte*>(brick.bytes->data());
             for (size_t row = 0; row < 64; ++row) {
-                std::byte* const to = codes.data() + packed_at(job, row, 8 * code_bytes);
-                for (size_t x = 0; x < 8; ++x) {
-                    const float d_voxels = texels.distance[row * 8 + x] * voxels_per_metre;
-                    const uint32_t code = half ? field::half_code(d_voxels) : field::snorm8_code(d_voxels);
-                    std::memcpy(to + x * code_bytes, &code, code_bytes);
-                }
-                std::memcpy(words.data() + packed_at(job, row, 16), texels.material + row * 8, 16);
+                std::memcpy(codes.data() + packed_at(job, row, 8 * code_bytes), from + row * 8 * code_bytes,
+                            8 * code_bytes);
+                if (brick.materials)
+                    std::memcpy(words.data() + packed_at(job, row, 16), brick.materials->words.data() + row * 8, 16);
             }
-            std::copy_n(texels.palette, field::kPaletteSize, palettes.begin() + ptrdiff_t(job) * field::kPaletteSize);
+            for (size_t entry = 0; entry < field::kPaletteSize; ++entry)
+                palettes[job * field::kPaletteSize + entry] = brick.palette(entry);
         });
         // Palettes of slots that follow each other in one write.
         for (size_t i = 0; i < slice.size();) {

@@ -75,6 +75,15 @@ private:
                        std::span<const std::byte> old);
     Result<void> store(Storage& storage, std::string_view name, std::span<const std::byte> bytes,
                        std::span<const std::byte> old);
+    template <typename T, size_t kPage>
+    Result<void> store_pages(Storage& storage, std::string_view name, const PagedArray<T, kPage>& pages,
+                             const PagedArray<T, kPage>* old);
+    template <typename T>
+    Result<void> write_grown(const Storage& storage, uint64_t offset, const AppendArray<T>& array,
+                             const AppendArray<T>* old);
+    template <typename T>
+    Result<void> store_grown(Storage& storage, std::string_view name, const AppendArray<T>& array,
+                             const AppendArray<T>* old);
     Result<void> make_atlas(uint32_t slots, rhi::Format format, Baker baker);
     void drop_atlas();
     Result<void> bake(std::span<const uint32_t> slots);

@@ -176,8 +176,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         }
     }
     stats.bricks = int(frame.field->stats().bricks);
-    stats.edits = int(std::count_if(frame.field->program().edits.begin(), frame.field->program().edits.end(),
-                                    [](const sdf::EditSpan& e) { return e.count != 0; }));
+    stats.edits = int(frame.field->program().index.size());
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;

@@ -88,7 +88,8 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
     std::vector<uint32_t> edits;
     for (const sdf::Instruction& i : code)
         if (has_edit(i)) edits.push_back(uint32_t(program.params[i.param + kEditWord]));
-    std::sort(edits.begin(), edits.end());
+    std::sort(edits.begin(), edits.end(),
+              [&](uint32_t a, uint32_t b) { return program.edits[a].order < program.edits[b].order; });
     edits.erase(std::unique(edits.begin(), edits.end()), edits.end());
     if (edits.empty()) return UINT32_MAX;
     std::vector<sdf::Instruction> copy(code.begin(), code.end());
@@ -102,8 +103,7 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
         params.insert(params.end(), first, last);
         params.resize(at + kMost);
         if (has_edit(i)) {
-            const auto rank =
-                std::lower_bound(edits.begin(), edits.end(), uint32_t(params[at + kEditWord])) - edits.begin();
+            const auto rank = std::find(edits.begin(), edits.end(), uint32_t(params[at + kEditWord])) - edits.begin();
             params[at + kEditWord] = float(rank);
         }
         i.param = uint32_t(at);
@@ -119,7 +119,7 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
     std::vector<sdf::Instruction> alone;
     for (const uint32_t e : edits) {
         const sdf::EditSpan& span = program.edits[e];
-        if (e <= found || span.op != Op::Union) continue;
+        if (span.order <= program.edits[found].order || span.op != Op::Union) continue;
         alone.assign(1, sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0));
         alone.insert(alone.end(), program.code.begin() + span.first, program.code.begin() + span.first + span.count);
         if (std::abs(sdf::evaluate(sdf::view(program, alone), p) - surface) <= 1e-7 * (1 + largest(p))) found = e;
@@ -167,7 +167,7 @@ void ExactField::sample(std::span<const vec3> points, FieldSample* out) const {
 RayHit ExactField::cast(const Ray& ray) const {
     RayHit out;
     const double length = std::sqrt(double(dot(ray.direction, ray.direction)));
-    if (!(length > 0) || program_.edits.empty()) return out;
+    if (!(length > 0) || program_.index.size() == 0) return out;
     const dvec3 o{double(ray.origin.x), double(ray.origin.y), double(ray.origin.z)};
     const dvec3 dir{double(ray.direction.x) / length, double(ray.direction.y) / length,
                     double(ray.direction.z) / length};
@@ -175,8 +175,7 @@ RayHit ExactField::cast(const Ray& ray) const {
     double extent = 64;  // metres: how large the pruned balls are
     if (!program_.unbounded) {
         if (program_.bounds.empty()) return out;
-        float reach = 0;  // smooth unions bulge beyond their operands
-        for (const sdf::EditSpan& e : program_.edits) reach = std::max(reach, e.reach);
+        const float reach = program_.index.largest_reach();  // smooth unions bulge beyond their operands
         const Box3 box = program_.bounds.inflated(reach + 1e-3f * (1 + float(length_of(program_.bounds))));
         extent = length_of(box);
         clip(o, dir, box, t, end);

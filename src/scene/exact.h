@@ -20,7 +20,7 @@ public:
     double distance(dvec3 p) const;
     FieldSample sample(vec3 p) const;
     void sample(std::span<const vec3> points, FieldSample* out) const;
-    /// RayHit::edit.index is the edit's number in the list; its generation is 0.
+    /// RayHit::edit.index is the edit's row in the program; its generation is 0.
     RayHit cast(const Ray& ray) const;
 
 private:

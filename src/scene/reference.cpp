@@ -53,9 +53,8 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
         constexpr float inf = std::numeric_limits<float>::infinity();
         field.bounds = {{-inf, -inf, -inf}, {inf, inf, inf}};
     } else if (!field.bounds.empty()) {
-        float reach = 0;  // smooth unions bulge beyond their operands
-        for (const sdf::EditSpan& e : program.edits) reach = std::max(reach, e.reach);
-        field.bounds = field.bounds.inflated(reach);
+        field.bounds =
+            field.bounds.inflated(program.index.largest_reach());  // smooth unions bulge beyond their operands
     }
     const render::ReferencePicture traced =
         render::render_reference(field, frame.lights, render::shade::sky_params(frame.environment), frame.camera,
@@ -78,7 +77,7 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     if (stats) {
         *stats = {};
         stats->device = "CPU path tracer, exact edits";
-        stats->edits = int(program.edits.size());
+        stats->edits = int(program.index.size());
         stats->bricks = int(frame.field->stats().bricks);
         stats->frame_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         stats->passes = {{"reference", stats->frame_ms}};

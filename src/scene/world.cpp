@@ -18,6 +18,7 @@
 #include <cstring>
 #include <fstream>
 #include <sys/stat.h>
+#include <utility>
 
 namespace kiln {
 
@@ -83,7 +84,7 @@ Result<World> World::parse(std::string_view json, const std::string& file_name) 
     world.cameras = std::move(impl.data.stage.cameras);
     impl.number_all();
     // Compiled now, so that faults which only the whole scene shows come with their place.
-    if (auto compiled = impl.compiled(); !compiled) return compiled.error();
+    if (auto compiled = impl.compile_all(); !compiled) return compiled.error();
     return world;
 }
 
@@ -120,46 +121,70 @@ Result<ObjectId> World::add_object(Object object) {
     Edit placed;
     placed.node.kind = Node::Kind::Object;
     placed.node.object = {uint32_t(data.objects.size() - 1), 0};
-    if (auto fault = impl_->compile_fault(placed)) {
+    if (auto fault = impl_->object_fault(placed)) {
         data.objects.pop_back();
         return std::move(*fault);
     }
-    impl_->changed();
     return placed.node.object;
 }
 
 Result<EditId> World::add(Edit edit) {
     SceneData& data = impl_->data;
-    if (auto fault = impl_->edit_fault(edit)) return std::move(*fault);
-    if (edit.name.empty()) edit.name = impl_->free_name(edit);
-    if (impl_->position_of(edit.name))
+    if (!edit.name.empty() && impl_->position_of(edit.name))
         return Error{edit.name + ": there is an edit of this name; choose another", ErrorKind::Usage};
+    const uint32_t count = uint32_t(data.edits.size());
+    const uint32_t slot = impl_->free_slots.empty() ? uint32_t(impl_->slots.size()) : impl_->free_slots.back();
+    const auto row = impl_->compile_edit(edit, impl_->order_between(count - 1, UINT32_MAX), slot);
+    if (!row) return row.error();
+    if (edit.name.empty()) edit.name = impl_->free_name(edit);
     data.edits.push_back(std::move(edit));
     data.edit_places.push_back(SceneData::kNowhere);
-    const EditId id = impl_->new_id(uint32_t(data.edits.size() - 1));
-    impl_->changed();
+    const EditId id = impl_->new_id(count);
+    impl_->slots[id.index].row = *row;
+    impl_->row_changed(field::kNoRow, *row);
     return id;
 }
 
 Result<void> World::change(EditId id, Edit edit) {
     const auto at = impl_->position(id);
     if (!at) return Error{"change: the edit is gone", ErrorKind::Usage};
-    if (auto fault = impl_->edit_fault(edit)) return std::move(*fault);
     Edit& old = impl_->data.edits[*at];
     if (edit.name.empty()) edit.name = old.name;
     if (edit.name != old.name && impl_->position_of(edit.name))
         return Error{edit.name + ": there is an edit of this name; choose another", ErrorKind::Usage};
+    uint32_t& row = impl_->slots[id.index].row;
+    const auto made = impl_->compile_edit(edit, impl_->list.edits[row].order, id.index);
+    if (!made) return made.error();
+    impl_->list.remove(row);
     impl_->rename(old.name, edit.name, *at);
     old = std::move(edit);
-    impl_->changed();
+    impl_->row_changed(std::exchange(row, *made), *made);
     return {};
 }
 
 Result<void> World::remove(EditId id) {
     const auto at = impl_->position(id);
     if (!at) return Error{"remove: the edit is gone", ErrorKind::Usage};
+    const uint32_t row = impl_->slots[id.index].row;
+    impl_->list.remove(row);
     impl_->erase(*at);
-    impl_->changed();
+    impl_->row_changed(row, field::kNoRow);
+    return {};
+}
+
+Result<void> World::reorder(EditId id, EditId before) {
+    const auto at = impl_->position(id);
+    if (!at) return Error{"reorder: the edit is gone", ErrorKind::Usage};
+    const auto next = before ? impl_->position(before) : std::optional(uint32_t(impl_->data.edits.size()));
+    if (!next) return Error{"reorder: the edit to stand before is gone", ErrorKind::Usage};
+    if (*next == *at || *next == *at + 1) return {};
+    const uint64_t order = impl_->order_between(*next - 1, *next);
+    uint32_t& row = impl_->slots[id.index].row;
+    const auto made = impl_->compile_edit(impl_->data.edits[*at], order, id.index);
+    if (!made) return made.error();
+    impl_->list.remove(row);
+    impl_->move_position(*at, *next);
+    impl_->row_changed(std::exchange(row, *made), *made);
     return {};
 }
 
@@ -196,7 +221,7 @@ void World::Impl::number_all() {
     names.reserve(data.edits.size());
     for (uint32_t i = 0; i < data.edits.size(); ++i) {
         ids.push_back({i, 0});
-        slots.push_back({i, 0});
+        slots.push_back({i, 0, i});
         names.emplace(data.edits[i].name, i);
     }
 }
@@ -204,7 +229,7 @@ void World::Impl::number_all() {
 EditId World::Impl::new_id(uint32_t position) {
     uint32_t slot = uint32_t(slots.size());
     if (free_slots.empty()) {
-        slots.push_back({position, 0});
+        slots.push_back({position, 0, field::kNoRow});
     } else {
         slot = free_slots.back();
         free_slots.pop_back();
@@ -235,7 +260,7 @@ void World::Impl::rename(const std::string& old_name, const std::string& name, u
 
 void World::Impl::erase(uint32_t position) {
     const uint32_t slot = ids[position].index;
-    slots[slot] = {UINT32_MAX, slots[slot].generation + 1};
+    slots[slot] = {UINT32_MAX, slots[slot].generation + 1, field::kNoRow};
     free_slots.push_back(slot);
     names.erase(data.edits[position].name);
     data.edits.erase(data.edits.begin() + position);
@@ -257,20 +282,57 @@ std::string World::Impl::free_name(const Edit& edit) const {
     }
 }
 
-std::optional<Error> World::Impl::edit_fault(const Edit& edit) {
+Result<uint32_t> World::Impl::compile_edit(const Edit& edit, uint64_t order, uint32_t owner) {
     const std::string name = edit.name.empty() ? "edit" : edit.name;
     if (auto fault = scene::check_edit(edit, data.objects.size(), data.materials.size()))
         return Error{name + ": " + fault->message, fault->kind};
-    if (auto fault = compile_fault(edit)) return Error{name + ": " + fault->message, fault->kind};
-    return std::nullopt;
+    auto source = scene::with_grids(std::span(&edit, 1), data.objects, data.folder, grids);
+    if (!source) return Error{name + ": " + source.error().message, source.error().kind};
+    auto row = sdf::insert(list, source->edits[0], source->objects, grids.grids, order, owner);
+    if (!row) return Error{name + ": " + row.error().message, row.error().kind};
+    return row;
 }
 
-std::optional<Error> World::Impl::compile_fault(const Edit& edit) {
-    const std::lock_guard lock(mutex);
-    auto source = scene::with_grids(std::span(&edit, 1), data.objects, data.folder, grids);
+std::optional<Error> World::Impl::object_fault(const Edit& placed) {
+    auto source = scene::with_grids(std::span(&placed, 1), data.objects, data.folder, grids);
     if (!source) return source.error();
     auto alone = sdf::compile(source->source());
     return alone ? std::nullopt : std::optional(alone.error());
+}
+
+uint64_t World::Impl::order_between(uint32_t before, uint32_t after) {
+    const auto order_of = [&](uint32_t position) { return list.edits[slots[ids[position].index].row].order; };
+    const auto between = [&] {
+        return sdf::order_between(before < ids.size() ? order_of(before) : 0,
+                                  after < ids.size() ? order_of(after) : UINT64_MAX);
+    };
+    if (const uint64_t order = between()) return order;
+    // Room again, by numbering the whole list.
+    std::vector<uint32_t> rows(ids.size());
+    for (size_t i = 0; i < rows.size(); ++i) rows[i] = slots[ids[i].index].row;
+    list.number_anew(rows);
+    {
+        const std::lock_guard lock(mutex);
+        program.reset();
+    }
+    return between();
+}
+
+void World::Impl::move_position(uint32_t from, uint32_t to) {
+    const auto turn = [&](auto& list_of) {
+        const auto begin = list_of.begin();
+        if (from < to)
+            std::rotate(begin + from, begin + from + 1, begin + to);
+        else
+            std::rotate(begin + to, begin + from, begin + from + 1);
+    };
+    turn(data.edits);
+    turn(data.edit_places);
+    turn(ids);
+    for (uint32_t i = std::min(from, to); i < std::min<uint32_t>(std::max(from, to) + 1, uint32_t(ids.size())); ++i) {
+        slots[ids[i].index].position = i;
+        names[data.edits[i].name] = i;
+    }
 }
 
 }  // namespace kiln

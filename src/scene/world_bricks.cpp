@@ -14,8 +14,11 @@ bool World::Impl::sample_bricks(std::span<const vec3> points, const FieldSetting
     std::shared_ptr<const field::HostBricks> baked;
     {
         const std::lock_guard lock(mutex);
-        if (!bricks || bricks->field().revision() != ready->field->revision())
-            bricks = std::make_shared<const field::HostBricks>(field::HostBricks::bake(ready->field));
+        if (!bricks || bricks->field().revision() != ready->field->revision()) {
+            field::HostBricks next = bricks ? *bricks : field::HostBricks();
+            next.update(ready->field);
+            bricks = std::make_shared<const field::HostBricks>(std::move(next));
+        }
         baked = bricks;
     }
     constexpr size_t kChunk = 256;

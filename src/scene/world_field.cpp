@@ -23,6 +23,8 @@ namespace {
 /// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
 constexpr double kMaxCells = double(1u << 25);
 constexpr int kMostDoublings = 24;
+/// More changes than this since the last field, and it is built anew.
+constexpr size_t kMostChanges = 256;
 
 bool same(const FieldSettings& a, const FieldSettings& b) {
     return a.voxel_size == b.voxel_size && a.cells == b.cells && a.levels == b.levels && a.bounds == b.bounds &&
@@ -42,15 +44,19 @@ double cells_of(const Box3& box, float voxel) {
 
 }  // namespace
 
-void World::Impl::changed() {
+void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     const std::lock_guard lock(mutex);
     program.reset();
-    stale = true;
+    changes.push_back({removed, inserted});
 }
 
-Result<std::shared_ptr<const sdf::Program>> World::Impl::compiled() {
+std::shared_ptr<const sdf::Program> World::Impl::compiled() {
     const std::lock_guard lock(mutex);
-    if (program) return program;
+    if (!program) program = std::make_shared<const sdf::Program>(list);
+    return program;
+}
+
+Result<void> World::Impl::compile_all() {
     sdf::Fault fault;
     const auto placed = [&](Error error) -> Error {
         // From the compiler's numbers back to the file.
@@ -80,8 +86,13 @@ Result<std::shared_ptr<const sdf::Program>> World::Impl::compiled() {
     if (!source) return placed(source.error());
     auto made = sdf::compile(source->source(), &fault);
     if (!made) return placed(made.error());
-    program = std::make_shared<const sdf::Program>(std::move(*made));
-    return program;
+    list = std::move(*made);
+    for (uint32_t i = 0; i < ids.size(); ++i) slots[ids[i].index].row = i;
+    const std::lock_guard lock(mutex);
+    program.reset();
+    built = {};
+    changes.clear();
+    return {};
 }
 
 World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const FieldSettings& settings) const {
@@ -103,23 +114,22 @@ World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const Fie
 }
 
 Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
-    auto compiled_program = compiled();
-    if (!compiled_program) return compiled_program.error();
+    const std::shared_ptr<const sdf::Program> now = compiled();
     const std::lock_guard lock(mutex);
     const bool comparable = built.field && same(settings, built_with);
-    if (comparable && !stale) return built;
+    if (comparable && changes.empty()) return built;
     if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
         return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
     if (settings.bounds && (settings.bounds->empty() || !settings.bounds->finite()))
         return Error{"field_settings.bounds must be finite, with min below max", ErrorKind::Usage};
-    const Resolution r = resolution(**compiled_program, settings);
+    const Resolution r = resolution(*now, settings);
     Built next;
     if (comparable && built.coarsened == 0 && built.field->options().voxel_size == r.voxel_size &&
-        built.field->options().bounds == r.bounds) {
-        // Only what the change reaches is made again.
-        if (auto updated = field::Field::update(*built.field, *compiled_program, {})) {
+        built.field->options().bounds == r.bounds && changes.size() <= kMostChanges) {
+        // Only what the changes reach is made again.
+        if (auto updated = field::Field::update(*built.field, now, changes)) {
             built.field = std::move(*updated);
-            stale = false;
+            changes.clear();
             return built;
         }
     }
@@ -129,7 +139,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     options.format = settings.distance_8bit ? field::DistanceFormat::Snorm8 : field::DistanceFormat::Half;
     for (;; ++next.coarsened, options.voxel_size *= 2) {
         if (cells_of(options.bounds, options.voxel_size) > kMaxCells && next.coarsened < kMostDoublings) continue;
-        auto made = field::Field::build(*compiled_program, options);
+        auto made = field::Field::build(now, options);
         if (made) {
             next.field = std::move(*made);
             break;
@@ -138,14 +148,12 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     }
     built = next;
     built_with = settings;
-    stale = false;
+    changes.clear();
     return next;
 }
 
 float World::distance(vec3 p) const {
-    auto program = impl_->compiled();
-    if (!program) return std::numeric_limits<float>::infinity();
-    return float(scene::ExactField(**program).distance({double(p.x), double(p.y), double(p.z)}));
+    return float(scene::ExactField(*impl_->compiled()).distance({double(p.x), double(p.y), double(p.z)}));
 }
 
 FieldSample World::sample(vec3 p, FieldSource source) const { return sample(std::span(&p, 1), source).front(); }
@@ -154,23 +162,21 @@ std::vector<FieldSample> World::sample(std::span<const vec3> points, FieldSource
     std::vector<FieldSample> out(points.size());
     for (FieldSample& s : out) s.distance = std::numeric_limits<float>::infinity();
     if (source == FieldSource::Bricks && impl_->sample_bricks(points, field_settings, out.data())) return out;
-    auto program = impl_->compiled();
-    if (program) scene::ExactField(**program).sample(points, out.data());
+    scene::ExactField(*impl_->compiled()).sample(points, out.data());
     return out;
 }
 
 RayHit World::cast(const Ray& ray) const {
-    auto program = impl_->compiled();
-    if (!program) return {};
-    RayHit hit = scene::ExactField(**program).cast(ray);
-    hit.edit = hit.hit && hit.edit.index < impl_->ids.size() ? impl_->ids[hit.edit.index] : EditId{};
+    const std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    RayHit hit = scene::ExactField(*program).cast(ray);
+    if (hit.hit && hit.edit) {
+        const uint32_t slot = program->edits[hit.edit.index].owner;
+        hit.edit = {slot, impl_->slots[slot].generation};
+    }
     return hit;
 }
 
-Box3 World::bounds() const {
-    auto program = impl_->compiled();
-    return program ? (*program)->bounds : Box3{};
-}
+Box3 World::bounds() const { return impl_->compiled()->bounds; }
 
 Result<Frame> World::frame(std::string_view camera) const {
     auto built = impl_->field(field_settings);
@@ -229,16 +235,14 @@ std::string World::inspect_json() const {
     out["lights"] = lights.size();
     out["cameras"] = camera_names;
     out["not_drawn_yet"] = data.undrawn;
-    if (auto program = impl_->compiled()) {
-        out["bounds"] = box_json((*program)->bounds);
-        out["unbounded"] = (*program)->unbounded;
-        out["instructions"] = (*program)->code.size();
-    }
+    const std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    out["bounds"] = box_json(program->bounds);
+    out["unbounded"] = program->unbounded;
+    out["instructions"] = program->tape().size();
     if (auto built = impl_->field(field_settings)) {
         const field::Field& f = *built->field;
         const field::GridParams grid = f.grid();
-        uint32_t bricks = 0;
-        for (const field::BrickRecord& r : f.records()) bricks += r.code_count > 0;
+        const uint32_t bricks = f.stats().bricks;
         const int bytes_a_texel = f.options().format == field::DistanceFormat::Half ? 2 : 1;
         out["voxel_size"] = f.options().voxel_size;
         out["grid_cells"] = {grid.size_x, grid.size_y, grid.size_z};

@@ -22,6 +22,7 @@ struct World::Impl {
     struct Slot {
         uint32_t position = UINT32_MAX;  ///< in data.edits; UINT32_MAX when free
         uint32_t generation = 0;
+        uint32_t row = field::kNoRow;  ///< in `list`
     };
 
     scene::SceneData data;
@@ -37,9 +38,13 @@ struct World::Impl {
     void rename(const std::string& old_name, const std::string& name, uint32_t position);
     void erase(uint32_t position);
     std::string free_name(const Edit& edit) const;
-    /// Why an edit given by code is refused.
-    std::optional<Error> edit_fault(const Edit& edit);
-    std::optional<Error> compile_fault(const Edit& edit);
+    /// Puts an edit given by code into the list, at the place `order`, or says why not.
+    Result<uint32_t> compile_edit(const Edit& edit, uint64_t order, uint32_t owner);
+    std::optional<Error> object_fault(const Edit& placed);
+    /// The place in the list between the edits at two positions; makes room where there is none.
+    uint64_t order_between(uint32_t before, uint32_t after);
+    void move_position(uint32_t from, uint32_t to);
+    void row_changed(uint32_t removed, uint32_t inserted);
 
     /// What the field is made with, after defaults.
     struct Resolution {
@@ -55,15 +60,17 @@ struct World::Impl {
 
     // Made when asked; under the mutex, because const functions may be called from any thread.
     std::mutex mutex;
-    std::shared_ptr<const sdf::Program> program;
+    sdf::Program list;                            ///< what the edits compile to; kept up with every change
+    std::shared_ptr<const sdf::Program> program;  ///< a snapshot of it
     Built built;
     FieldSettings built_with;
-    bool stale = false;                               ///< `built` is of an older program
+    std::vector<field::RowChange> changes;            ///< since `built`
     std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
     scene::Grids grids;
 
-    void changed();
-    Result<std::shared_ptr<const sdf::Program>> compiled();
+    /// Compiles the whole list.
+    Result<void> compile_all();
+    std::shared_ptr<const sdf::Program> compiled();
     Result<Built> field(const FieldSettings& settings);
     /// Trilinear in bricks, exact elsewhere; false when there is no field.
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 #include <string>
 
 namespace kiln::sdf {
@@ -104,19 +105,19 @@ class Compiler {
 public:
     Compiler(const Resolved& resolved, Program& out) : resolved_(resolved), out_(out) {}
 
-    Result<void> run() {
-        const std::span<const Edit> edits = resolved_.source.edits;
-        out_.samples = resolved_.samples;
-        out_.code.push_back(Instruction::make(Opcode::Empty, 0, 0, 0, 0, 0));
-        out_.params.push_back(0);
-        out_.edits.resize(edits.size());
-        for (uint32_t e = 0; e < edits.size(); ++e) {
-            EditSpan& span = out_.edits[e];
-            span.first = uint32_t(out_.code.size());
-            span.op = edits[e].op;
-            if (edits[e].hidden) continue;
-            edit_ = e;
-            const Edit& edit = edits[e];
+    // Makes edit `e` of the source the program's next row.
+    Result<void> add(uint32_t e, uint64_t order, uint32_t owner) {
+        const Edit& edit = resolved_.source.edits[e];
+        EditSpan span;
+        span.op = edit.op;
+        span.order = order;
+        span.owner = owner;
+        edit_ = e;
+        row_ = uint32_t(out_.edits.size());
+        params_first_ = uint32_t(out_.params.size());
+        params_.clear();
+        code_.clear();
+        if (!edit.hidden) {
             const float k = edit.blend_radius;
             const float k_material = edit.material_blend_radius < 0 ? k : edit.material_blend_radius;
             expand(edit);
@@ -124,36 +125,28 @@ public:
             if (nodes_[0].need >= kRegisters)
                 return Error{"edit " + edit.name + ": needs too many registers", ErrorKind::Input};
             emit(0, 1);
-            const uint32_t at = uint32_t(out_.params.size());
-            out_.params.insert(out_.params.end(), {k, k_material});
+            const uint32_t at = add_params({k, k_material});
             const uint32_t flag = nodes_[0].lacks_material ? kMayLackMaterial : 0u;
-            out_.code.push_back(Instruction::make(Opcode::Combine, uint32_t(edit.op) | flag, 0, 0, 1, at));
-            span.count = uint32_t(out_.code.size()) - span.first;
+            code_.push_back(Instruction::make(Opcode::Combine, uint32_t(edit.op) | flag, 0, 0, 1, at));
             span.bounds = resolved_.edit_bounds[e].parent;
+            span.blend = k;
             span.rate = resolved_.edit_bounds[e].rate;
             span.reach = std::max(k, k_material);
-            if (edit.op == Op::Union) {
-                if (span.bounds.finite()) {
-                    out_.bounds = box_union(out_.bounds, span.bounds.inflated(0.25f * k));
-                } else {
-                    out_.unbounded = true;
-                }
-            }
+            span.first = uint32_t(out_.code.size());
+            span.count = uint32_t(code_.size());
+            out_.params.append(params_);
+            out_.code.append(code_);
         }
-        // Where something is everywhere, bounded cuts and paint show outside the solids too.
-        for (const EditSpan& span : out_.edits) {
-            if (out_.unbounded && span.count > 0 && span.op != Op::Union && span.bounds.finite()) {
-                out_.bounds = box_union(out_.bounds, span.bounds.inflated(0.25f * span.reach));
-            }
-        }
+        out_.edits.push_back(span);
+        if (span.count > 0) out_.index.insert(span.indexed(row_));
         return {};
     }
 
 private:
     uint32_t add_params(std::initializer_list<float> head, std::span<const float> tail = {}) {
-        const uint32_t at = uint32_t(out_.params.size());
-        out_.params.insert(out_.params.end(), head);
-        out_.params.insert(out_.params.end(), tail.begin(), tail.end());
+        const uint32_t at = params_first_ + uint32_t(params_.size());
+        params_.insert(params_.end(), head);
+        params_.insert(params_.end(), tail.begin(), tail.end());
         return at;
     }
 
@@ -369,7 +362,7 @@ private:
         Binary leaf;
         leaf.aux = shape.kind;
         leaf.chain = flush(task.chain, task.pending);
-        leaf.param = add_params({float(task.scale), float(task.material), float(edit_)}, params);
+        leaf.param = add_params({float(task.scale), float(task.material), float(row_)}, params);
         leaf.lacks_material = task.material == kNoMaterial;
         add_node(task, leaf);
     }
@@ -391,11 +384,11 @@ private:
     }
 
     void emit_chain(uint32_t chain) {
-        const size_t from = out_.code.size();
+        const size_t from = code_.size();
         for (uint32_t s = chain; s != kNone; s = steps_[s].before) {
-            out_.code.push_back(Instruction::make(steps_[s].opcode, steps_[s].aux, 0, 0, 0, steps_[s].param));
+            code_.push_back(Instruction::make(steps_[s].opcode, steps_[s].aux, 0, 0, 0, steps_[s].param));
         }
-        std::reverse(out_.code.begin() + long(from), out_.code.end());
+        std::reverse(code_.begin() + long(from), code_.end());
     }
 
     void emit(uint32_t root, uint32_t dst) {
@@ -411,7 +404,7 @@ private:
             const Binary& n = nodes_[v.node];
             if (n.kind == Binary::Kind::Leaf) {
                 emit_chain(n.chain);
-                out_.code.push_back(Instruction::make(Opcode::Shape, n.aux, v.dst, 0, 0, n.param));
+                code_.push_back(Instruction::make(Opcode::Shape, n.aux, v.dst, 0, 0, n.param));
             } else if (n.kind != Binary::Kind::Combine) {
                 if (v.stage == 0) {
                     stack.push_back({v.node, v.dst, 1});
@@ -419,7 +412,7 @@ private:
                 } else {
                     emit_chain(n.chain);
                     const Opcode op = n.kind == Binary::Kind::Value ? Opcode::Value : Opcode::Bound;
-                    out_.code.push_back(Instruction::make(op, n.aux, v.dst, 0, 0, n.param));
+                    code_.push_back(Instruction::make(op, n.aux, v.dst, 0, 0, n.param));
                 }
             } else {
                 const bool left_first = nodes_[n.left].need >= nodes_[n.right].need;
@@ -432,7 +425,7 @@ private:
                     const uint32_t a = left_first ? v.dst : v.dst + 1;
                     const uint32_t b = left_first ? v.dst + 1 : v.dst;
                     const uint32_t flag = nodes_[n.right].lacks_material ? kMayLackMaterial : 0u;
-                    out_.code.push_back(Instruction::make(Opcode::Combine, n.aux | flag, v.dst, a, b, n.param));
+                    code_.push_back(Instruction::make(Opcode::Combine, n.aux | flag, v.dst, a, b, n.param));
                 }
             }
         }
@@ -440,20 +433,105 @@ private:
 
     const Resolved& resolved_;
     Program& out_;
-    uint32_t edit_ = 0;
+    uint32_t edit_ = 0, row_ = 0;
+    uint32_t params_first_ = 0;  // where params_ will lie in the program
+    std::vector<float> params_;
+    std::vector<Instruction> code_;
     std::vector<Binary> nodes_;
     std::vector<ChainStep> steps_;
     std::vector<Task> tasks_;
 };
 
+// What every program begins with: the number that instructions without numbers name.
+void begin(Program& program) {
+    if (program.params.empty()) program.params.push_back(0);
+}
+
+void adopt_grids(Program& program, const Resolved& resolved) {
+    program.samples.append(resolved.samples);
+    program.grids = resolved.grids;
+}
+
 }  // namespace
+
+struct Program::Tape {
+    std::once_flag once;
+    std::vector<Instruction> code;
+};
+
+std::vector<uint32_t> Program::rows() const {
+    std::vector<uint32_t> out;
+    index.all(out);
+    std::sort(out.begin(), out.end(), [this](uint32_t a, uint32_t b) { return edits[a].order < edits[b].order; });
+    return out;
+}
+
+std::span<const Instruction> Program::tape() const {
+    static constexpr Instruction kNothing[] = {Instruction::make(Opcode::Empty, 0, 0, 0, 0, 0)};
+    if (!tape_) return kNothing;
+    std::call_once(tape_->once, [this] {
+        std::vector<Instruction>& out = tape_->code;
+        out.push_back(kNothing[0]);
+        for (const uint32_t row : rows()) {
+            const auto part = code.subspan(edits[row].first, edits[row].count);
+            out.insert(out.end(), part.begin(), part.end());
+        }
+    });
+    return tape_->code;
+}
+
+void Program::settle() {
+    unbounded = index.fills_space();
+    bounds = unbounded ? box_union(index.solids(), index.others()) : index.solids();
+    tape_ = std::make_shared<Tape>();
+}
+
+void Program::remove(uint32_t row) {
+    if (edits[row].count > 0) index.remove(edits[row].indexed(row));
+    settle();
+}
+
+void Program::number_anew(std::span<const uint32_t> rows) {
+    std::vector<EditSpan> next(edits.begin(), edits.end());
+    for (size_t i = 0; i < rows.size(); ++i) next[rows[i]].order = order_at(i);
+    edits = {};
+    edits.append(next);
+    settle();
+}
+
+uint64_t order_between(uint64_t before, uint64_t after) {
+    if (before == 0 && after == UINT64_MAX) return order_at(0);
+    if (before == 0) return after - std::min(after / 2, uint64_t(1) << 32);
+    if (after == UINT64_MAX) return before + std::min((after - before) / 2, uint64_t(1) << 32);
+    const uint64_t middle = before + (after - before) / 2;
+    return middle == before ? 0 : middle;
+}
 
 Result<Program> compile(const Source& source, Fault* fault) {
     auto resolved = resolve(source, fault);
     if (!resolved) return resolved.error();
     Program out;
-    if (auto r = Compiler(*resolved, out).run(); !r) return r.error();
+    begin(out);
+    Compiler compiler(*resolved, out);
+    for (uint32_t e = 0; e < source.edits.size(); ++e) {
+        if (auto r = compiler.add(e, order_at(e), e); !r) return r.error();
+    }
+    adopt_grids(out, *resolved);
+    out.settle();
     return out;
+}
+
+Result<uint32_t> insert(Program& program, const Edit& edit, std::span<const Object> objects,
+                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault) {
+    const Source source{{&edit, 1}, objects, grids, program.grids, uint32_t(program.samples.size())};
+    auto resolved = resolve(source, fault);
+    if (!resolved) return resolved.error();
+    begin(program);
+    const uint32_t row = uint32_t(program.edits.size());
+    if (auto r = Compiler(*resolved, program).add(0, order, owner); !r) return r.error();
+    adopt_grids(program, *resolved);
+    program.settle();
+    return row;
 }
 
 }  // namespace kiln::sdf

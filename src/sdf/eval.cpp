@@ -63,19 +63,19 @@ Isa best_isa() {
     return chosen;
 }
 
+#define KILN_CHOOSE(isa, name)          \
+    (isa == Isa::Avx512 ? &avx512::name \
+     : isa == Isa::Avx2 ? &avx2::name   \
+     : isa == Isa::Sse4 ? &sse4::name   \
+                        : &scalar::name)
+
 void evaluate(const TapeView& tape, const Points& points, float* out, Isa isa) {
-    const auto run = isa == Isa::Avx512 ? &avx512::evaluate_points
-                     : isa == Isa::Avx2 ? &avx2::evaluate_points
-                     : isa == Isa::Sse4 ? &sse4::evaluate_points
-                                        : &scalar::evaluate_points;
+    const auto run = KILN_CHOOSE(isa, evaluate_points);
     run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x, points.y, points.z, points.count, out);
 }
 
 void evaluate_materials(const TapeView& tape, const Points& points, float* out, MaterialMix* mix, bool edits, Isa isa) {
-    const auto run = isa == Isa::Avx512 ? &avx512::evaluate_mixes
-                     : isa == Isa::Avx2 ? &avx2::evaluate_mixes
-                     : isa == Isa::Sse4 ? &sse4::evaluate_mixes
-                                        : &scalar::evaluate_mixes;
+    const auto run = KILN_CHOOSE(isa, evaluate_mixes);
     constexpr int kBatch = 512;
     float id0[kBatch], id1[kBatch], share[kBatch];
     for (int at = 0; at < points.count; at += kBatch) {
@@ -101,6 +101,21 @@ double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix, bool edit
         *mix = {uint16_t(m.id0), uint16_t(m.id1), float(m.share)};
     }
     return r.value[0].v[0];
+}
+
+void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, const Balls& balls, uint64_t* left,
+               uint64_t* right, float* value, Isa isa) {
+    KILN_CHOOSE(isa, fold_list)
+    (entries.data(), entries.size(), numbers.params, numbers.samples, balls, left, right, value);
+}
+
+float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out, Isa isa) {
+    return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z,
+                                            out);
+}
+
+void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes, Isa isa) {
+    KILN_CHOOSE(isa, store_halves)(values.data(), values.size(), scale, limit, least, codes);
 }
 
 }  // namespace kiln::sdf

@@ -5,6 +5,7 @@
 
 #include "sdf/program.h"
 
+#include <limits>
 #include <span>
 
 namespace kiln::sdf {
@@ -35,7 +36,7 @@ struct TapeView {
     const float* params;
     const float* samples;
 };
-inline TapeView view(const Program& program) { return {program.code, program.params.data(), program.samples.data()}; }
+inline TapeView view(const Program& program) { return {program.tape(), program.params.data(), program.samples.data()}; }
 inline TapeView view(const Program& program, std::span<const Instruction> code) {
     return {code, program.params.data(), program.samples.data()};
 }
@@ -47,5 +48,44 @@ void evaluate_materials(const TapeView& tape, const Points& points, float* out, 
                         Isa isa = best_isa());
 /// One point in double precision; the materials (or edits) too when `mix` is given.
 double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix = nullptr, bool edits = false);
+
+/// Float evaluation is off by a few ulps of the coordinates and values involved; 2^-18 of their size covers 64 of them.
+inline constexpr float kPruneUlps = 3.8e-6f;
+
+/// One edit of a list to fold: its code without the world Combine, result in R1.
+struct FoldEntry {
+    enum Join : uint8_t { Combine, Take, Move, Negate };
+    const uint32_t* code;
+    uint32_t code_count;
+    float blend, reach;  ///< of its Combine, metres
+    uint8_t op;
+    Join join;                 ///< Combine, or what pruning for a larger ball has made of it (program.h)
+    float middle[3], half[3];  ///< box outside of which its value is above Balls::far + reach; half may be infinite
+};
+
+/// Centres of up to 64 balls of one radius; those without a bit in `live` are computed but mean nothing.
+struct Balls {
+    alignas(64) float x[64], y[64], z[64];
+    float radius = 0;                                    ///< metres
+    float half_side = 0;                                 ///< of the cube that matters in each ball, metres
+    float far = std::numeric_limits<float>::infinity();  ///< values beyond +-far need only stay beyond it, metres
+    uint64_t live = 0;
+
+    vec3 center(int i) const { return {x[i], y[i], z[i]}; }
+};
+
+/// Folds the list at the centres of 64 balls: value[i] is the world's there. Bit i of left[e] (right[e]) says that at edit e everything
+/// before it (the edit alone) decides throughout ball i: as sdf::prune finds, or because the other is beyond `far`.
+void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, const Balls& balls, uint64_t* left,
+               uint64_t* right, float* value, Isa isa = best_isa());
+
+/// evaluate() at the 512 points (x[i], y[j], z[k]), i fastest; the smallest |value| of them.
+float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out,
+                     Isa isa = best_isa());
+
+/// Half-float bits of values * scale: clamped to +-limit, which NaN becomes too, and never below `least` unless exactly 0 (which loses its
+/// sign). `count` is a multiple of 16; limit and least are normal halves.
+void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes,
+                  Isa isa = best_isa());
 
 }  // namespace kiln::sdf

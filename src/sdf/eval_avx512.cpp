@@ -29,4 +29,7 @@ static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof 
 
 #include "sdf/eval_lanes.inl"
 #include "sdf/eval_entry.inl"
+
+static inline uint32_t lane_bits(mask m) { return uint32_t(_mm512_movepi32_mask(__m512i(m.v))); }
+#include "sdf/eval_list.inl"
 }  // namespace kiln::sdf::avx512

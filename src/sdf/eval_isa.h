@@ -2,7 +2,9 @@
 // Raw entry points of each instruction set (eval_entry.inl), and what every eval_*.cpp includes before opening its namespace.
 #pragma once
 
-#include "sdf/program.h"
+#include "sdf/eval.h"
+
+#include <kiln/shapes.h>
 
 #include <cmath>
 #include <cstddef>
@@ -15,12 +17,23 @@
     void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, \
                         const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,  \
                         int slot);                                                                                     \
+    void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples,                  \
+                   const Balls& balls, uint64_t* left, uint64_t* right, float* value);                                 \
+    float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples,                \
+                         const float* x, const float* y, const float* z, float* out);                                  \
+    void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes);      \
     }
 KILN_DECLARE_ISA(scalar)
 KILN_DECLARE_ISA(sse4)
 KILN_DECLARE_ISA(avx2)
 KILN_DECLARE_ISA(avx512)
 #undef KILN_DECLARE_ISA
+
+namespace kiln::sdf {
+// Shapes whose leaves run over a whole brick in one loop.
+inline constexpr uint32_t kFusedSphere = uint32_t(ShapeKind::Sphere);
+inline constexpr uint32_t kFusedBox = uint32_t(ShapeKind::Box);
+}  // namespace kiln::sdf
 
 // Texts shared with GLSL name parameters they do not always use.
 #pragma GCC diagnostic ignored "-Wunused-parameter"

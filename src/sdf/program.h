@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Program: the world's ordered edits compiled to one register tape.
+// Program: the world's ordered edits compiled to register code, one row an edit. A value: copying one is a few pointers, and a copy with
+// an edit inserted or removed costs that edit alone, so every state of a world can be kept.
 //
 // The tape is a list of 8-byte instructions over 24 value registers, one point register P and the cell's point C. Every value
 // register holds, in world metres, a 1-Lipschitz function of the world point: scales and Lipschitz factors are folded into
@@ -9,10 +10,14 @@
 // Expressions", 1970), so 24 registers serve any tree of up to 2^22 leaves.
 #pragma once
 
+#include "base/append_array.h"
+#include "sdf/edit_index.h"
+
 #include <kiln/edit.h>
 #include <kiln/result.h>
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -69,25 +74,57 @@ struct Instruction {
 };
 static_assert(sizeof(Instruction) == 8);
 
-/// What the field needs to know of one edit.
+/// One edit, compiled: a row of the program. Never changes once written.
 struct EditSpan {
-    uint32_t first = 0, count = 0;  ///< its instructions, the world Combine last
+    uint32_t first = 0, count = 0;  ///< its instructions in Program::code, the world Combine last; count 0: hidden
     Box3 bounds;                    ///< of its solid, world metres; infinite faces for unbounded edits
-    float rate =
-        1;  ///< (0, 1]: outside `bounds` its value, before the world Combine, is at least rate · distance(p, bounds)
+    float blend = 0;                ///< blend radius, metres
     float reach =
         0;  ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
+    float rate = 1;  ///< outside `bounds` its value is at least this times the distance to them
     Op op = Op::Union;
+    uint32_t owner = 0;  ///< the caller's number of the edit
+    uint64_t order = 0;  ///< its place in the list: the world folds by ascending order
+
+    bool everywhere() const { return op == Op::Intersect || !bounds.finite(); }
+    IndexedEdit indexed(uint32_t row) const {
+        return {row,         bounds, reach, 1.0f / rate, 0.25f * (op == Op::Union ? blend : reach), op == Op::Union,
+                everywhere()};
+    }
 };
 
-struct Program {
-    std::vector<Instruction> code;  ///< [Empty R0] [edit 0] [edit 1] …; the result is R0
-    std::vector<float> params;
-    std::vector<float> samples;   ///< numbers of sampled shapes
-    std::vector<EditSpan> edits;  ///< same order as given; hidden edits have count 0 and empty bounds
+/// Where the numbers of a sampled shape lie in Program::samples, and its largest difference between neighbours along x and z.
+struct GridPlace {
+    uint32_t first = 0;
+    vec2 steps;
+};
+
+class Program {
+public:
+    AppendArray<Instruction> code;  ///< of every row, one after another, removed ones too
+    AppendArray<float> params;
+    AppendArray<float> samples;   ///< numbers of sampled shapes
+    AppendArray<EditSpan> edits;  ///< rows; which of them are in the world, `index` knows
+    EditIndex index;              ///< the visible edits
+    std::vector<GridPlace> grids;
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
     bool unbounded = false;  ///< some visible union edit has infinite bounds
+
+    /// Rows of the visible edits, in order.
+    std::vector<uint32_t> rows() const;
+    /// The whole world as one tape, [Empty R0] [edit 0] [edit 1] …, with its result in R0: made when first asked. Any thread.
+    std::span<const Instruction> tape() const;
+    /// Takes an edit out of the world. O(log edits).
+    void remove(uint32_t row);
+    /// Gives all edits of the world new orders, `rows` being all rows in order (hidden ones too). O(rows).
+    void number_anew(std::span<const uint32_t> rows);
+    /// Brings bounds, and the tape to come, up to the index.
+    void settle();
+
+private:
+    struct Tape;
+    std::shared_ptr<Tape> tape_;
 };
 
 /// Grid of a heightfield, row by row in z, values in [0, 1].
@@ -99,8 +136,10 @@ struct HeightGrid {
 /// What compile() reads.
 struct Source {
     std::span<const Edit> edits;
-    std::span<const Object> objects;    ///< ObjectId::index refers here
-    std::span<const HeightGrid> grids;  ///< Shape::data of a sampled shape is the decimal index of its grid
+    std::span<const Object> objects;      ///< ObjectId::index refers here
+    std::span<const HeightGrid> grids;    ///< Shape::data of a sampled shape is the decimal index of its grid
+    std::span<const GridPlace> placed{};  ///< the first grids, whose numbers a program holds already
+    uint32_t samples = 0;                 ///< how many numbers it holds
 };
 
 /// Where compile() found a fault.
@@ -111,9 +150,19 @@ struct Fault {
     int warp = -1;  ///< entry of the node's domain, -1: none
 };
 
-/// Compiles all edits. Fails on references to nothing, cycles, a repeat whose child does not fit its spacing, warps that need a
-/// bounded child, bends past their limit, and trees that expand to more than 2^22 leaves. `fault`, if given, says where.
+/// Compiles all edits, row i being edit i. Fails on references to nothing, cycles, a repeat whose child does not fit its spacing, warps
+/// that need a bounded child, bends past their limit, and trees that expand to more than 2^22 leaves. `fault`, if given, says where.
 /// Parameter ranges are not checked here (see out_of_range). Any thread.
 Result<Program> compile(const Source& source, Fault* fault = nullptr);
+
+/// Order of an edit that compile() puts at `position`, and one between two others (0 and UINT64_MAX: no other there); 0 where the two
+/// leave no room, and the list wants new numbers.
+inline constexpr uint64_t order_at(uint64_t position) { return (uint64_t(1) << 62) + (position << 32); }
+uint64_t order_between(uint64_t before, uint64_t after);
+
+/// Adds `edit` to the world as a new row, and answers its number; with place and objects as compile(). Fails as compile(), and changes
+/// nothing then. Costs what the edit costs. The owner's thread.
+Result<uint32_t> insert(Program& program, const Edit& edit, std::span<const Object> objects,
+                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault = nullptr);
 
 }  // namespace kiln::sdf

@@ -38,10 +38,8 @@ struct Ball {
     float center_size;  // largest coordinate of the centre, for rounding error
 };
 
-// Float evaluation is off by a few ulps of the coordinates and values involved; 2^-18 of their size covers 64 of them.
 float rounding(const Ball& ball, float left, float right) {
-    constexpr float k64Ulps = 3.8e-6f;
-    return k64Ulps * (ball.center_size + ball.radius + std::fabs(left) + std::fabs(right));
+    return kPruneUlps * (ball.center_size + ball.radius + std::fabs(left) + std::fabs(right));
 }
 
 Winner decide(uint32_t op, float left, float right, float reach, const Ball& ball) {
@@ -57,9 +55,9 @@ Winner decide(uint32_t op, float left, float right, float reach, const Ball& bal
     return Winner::Both;
 }
 
-}  // namespace
-
-float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruction>& out, PruneScratch& scratch) {
+// Appends what is kept; returns the value of `root`.
+float prune_register(const TapeView& tape, vec3 center, float radius, uint32_t root, Need root_need,
+                     std::vector<Instruction>& out, PruneScratch& scratch) {
     const size_t n = tape.code.size();
     scratch.left.resize(n);
     scratch.right.resize(n);
@@ -76,11 +74,11 @@ float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruc
         }
         centre::run_distance(r, &in.word, 1, tape.params, samples);
     }
-    const float value = r.value[0].v[0];
+    const float value = r.value[root].v[0];
 
     const Ball ball{radius, std::max({std::fabs(center.x), std::fabs(center.y), std::fabs(center.z)})};
     Need need[kRegisters] = {};
-    need[0] = Need::Value;
+    need[root] = root_need;
     bool need_point = false;
     std::vector<Instruction>& kept = scratch.reversed;
     kept.clear();
@@ -162,8 +160,20 @@ float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruc
             break;
         }
     }
-    out.assign(kept.rbegin(), kept.rend());
+    out.insert(out.end(), kept.rbegin(), kept.rend());
     return value;
+}
+
+}  // namespace
+
+float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruction>& out, PruneScratch& scratch) {
+    out.clear();
+    return prune_register(tape, center, radius, 0, Need::Value, out, scratch);
+}
+
+void prune_edit(const TapeView& edit, vec3 center, float radius, bool whole, std::vector<Instruction>& out,
+                PruneScratch& scratch) {
+    prune_register(edit, center, radius, 1, whole ? Need::Value : Need::Material, out, scratch);
 }
 
 }  // namespace kiln::sdf

@@ -21,4 +21,9 @@ struct PruneScratch {
 /// returns the tape's value at the centre. Any thread, one scratch each.
 float prune(const TapeView& tape, vec3 center, float radius, std::vector<Instruction>& out, PruneScratch& scratch);
 
+/// The same for one edit of a world list: its code without the world Combine, which makes R1. `whole`: its value is needed; else only what
+/// it is made of. Appends to `out`.
+void prune_edit(const TapeView& edit, vec3 center, float radius, bool whole, std::vector<Instruction>& out,
+                PruneScratch& scratch);
+
 }  // namespace kiln::sdf

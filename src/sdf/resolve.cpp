@@ -149,10 +149,11 @@ public:
 
     Result<void> run() {
         const Source& s = out_.source;
-        for (const HeightGrid& grid : s.grids) {
-            out_.grid_first.push_back(uint32_t(out_.samples.size()));
+        for (const GridPlace& place : s.placed) out_.grids.push_back(place);
+        for (size_t i = s.placed.size(); i < s.grids.size(); ++i) {
+            const HeightGrid& grid = s.grids[i];
+            out_.grids.push_back({s.samples + uint32_t(out_.samples.size()), steepest_steps(grid)});
             out_.samples.insert(out_.samples.end(), grid.values.begin(), grid.values.end());
-            out_.grid_steps.push_back(steepest_steps(grid));
         }
         collect_composites();
         const size_t objects = s.objects.size() + out_.composites.size();
@@ -371,11 +372,11 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
     for (const FieldRow& field : shape_rows()[shape.kind].fields()) {
         if (field.range != "internal") continue;
         const size_t at = size_t(field.offset);
-        if (field.name == "first") params[at] = float(grid_first[index]);
+        if (field.name == "first") params[at] = float(grids[index].first);
         if (field.name == "columns") params[at] = float(grid.columns);
         if (field.name == "rows") params[at] = float(grid.rows);
-        if (field.name == "step_x") params[at] = grid_steps[index].x;
-        if (field.name == "step_z") params[at] = grid_steps[index].y;
+        if (field.name == "step_x") params[at] = grids[index].steps.x;
+        if (field.name == "step_z") params[at] = grids[index].steps.y;
     }
     return params;
 }

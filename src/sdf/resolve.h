@@ -27,9 +27,8 @@ struct Resolved {
     std::vector<std::vector<NodeBounds>> object_bounds;  ///< by object, by node
     std::vector<NodeBounds> edit_bounds;                 ///< by edit; empty stages for hidden edits
 
-    std::vector<float> samples;        ///< all grids, one after another
-    std::vector<uint32_t> grid_first;  ///< where each grid begins in `samples`
-    std::vector<vec2> grid_steps;      ///< its largest difference between neighbours, along x and along z
+    std::vector<float> samples;    ///< the grids that are not yet placed, one after another
+    std::vector<GridPlace> grids;  ///< all
 
     /// A shape's numbers with the internal fields of sampled shapes filled in.
     std::array<float, kMaxParams> params_of(const Shape& shape) const;

@@ -23,13 +23,16 @@ TEST(BrickPool, HandsOutTheLowestFreeSlot) {
     EXPECT_EQ(pool.allocate(), 3u);
 }
 
-TEST(BrickPool, AdoptsWhatIsInUse) {
-    BrickPool pool(4);
-    pool.adopt({true, false, true});
-    EXPECT_EQ(pool.in_use(), 2u);
-    EXPECT_EQ(pool.allocate(), 1u);
-    EXPECT_EQ(pool.allocate(), 3u);
-    EXPECT_EQ(pool.allocate(), kNoSlot);
+TEST(BrickPool, ACopyKeepsItsOwnState) {
+    BrickPool pool(100);
+    for (uint32_t i = 0; i < 70; ++i) EXPECT_EQ(pool.allocate(), i);
+    BrickPool copy = pool;
+    pool.release(65);
+    EXPECT_TRUE(copy.used(65));
+    EXPECT_FALSE(pool.used(65));
+    EXPECT_EQ(copy.allocate(), 70u);
+    EXPECT_EQ(pool.allocate(), 65u);
+    EXPECT_EQ(pool.allocate(), 70u);
 }
 
 TEST(BrickPoolDeathTest, ASlotGivenBackTwiceStops) {

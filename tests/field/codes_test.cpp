@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "field/codes.gpu.h"
+#include "sdf/eval.h"
 #include "worlds.h"
 
 #include <cmath>
@@ -26,6 +27,38 @@ TEST(Codes, HalvesAreRoundedToNearestEven) {
         ASSERT_EQ(half_code(v), code);
         ASSERT_EQ(half_code(0.5f * (v + next)), (code & 1u) == 0 ? code : code + 1) << code;
         ASSERT_EQ(half_value(half_code(-v)), -v);
+    }
+}
+
+TEST(Codes, LanesMakeTheSameHalves) {
+    std::vector<float> values{0.0f,
+                              -0.0f,
+                              4.0f,
+                              -4.0f,
+                              1e30f,
+                              -1e30f,
+                              std::numeric_limits<float>::quiet_NaN(),
+                              std::numeric_limits<float>::infinity(),
+                              1e-30f,
+                              -1e-30f,
+                              6.1e-5f,
+                              -6.2e-5f};
+    for (uint32_t bits = 0x33000000u; bits <= 0x40900000u; bits += 6151) {
+        values.push_back(std::bit_cast<float>(bits));
+        values.push_back(-values.back());
+    }
+    for (uint32_t code = 0x0400; code < 0x4400; ++code)
+        values.push_back(0.5f * (half_value(code) + half_value(code + 1)));
+    while (values.size() % 16 != 0) values.push_back(1);
+    std::vector<uint16_t> codes(values.size());
+    const float scale = 3.7f;
+    for (const sdf::Isa isa : {sdf::Isa::Scalar, sdf::Isa::Sse4, sdf::Isa::Avx2, sdf::Isa::Avx512}) {
+        if (!sdf::has_isa(isa)) continue;
+        for (const float by : {1.0f, scale}) {
+            sdf::store_halves(values, by, kBandVoxels, kHalfStepVoxels, codes.data(), isa);
+            for (size_t i = 0; i < values.size(); ++i)
+                ASSERT_EQ(codes[i], half_code(values[i] * by)) << values[i] << " isa " << int(isa);
+        }
     }
 }
 

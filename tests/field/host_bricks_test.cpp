@@ -28,9 +28,7 @@ sdf::Judge judge_of(const worlds::World& world) {
 }
 
 void each_brick(const Field& field, const std::function<void(const BrickRecord&, uint32_t)>& fn) {
-    for (uint32_t slot = 0; slot < field.slot_count(); ++slot) {
-        if (field.records()[slot].code_count != 0) fn(field.records()[slot], slot);
-    }
+    for (const uint32_t slot : field.slots()) fn(field.records()[slot], slot);
 }
 
 double clamped(double d) { return std::min(std::max(d, -4.0), 4.0); }
@@ -328,17 +326,13 @@ TEST(HostBricks, APaletteKeepsTheSixteenHeaviestAndCountsTheRest) {
     const uint32_t word = bricks.field().cell_word(0, 0, 0);
     ASSERT_NE(word & kCellOccupied, 0u);
     EXPECT_GE(bricks.dropped_materials(), 9u);
-    const uint32_t* palette = bricks.palettes().data() + (word & kCellSlotMask) * 16;
-    for (int i = 1; i < 16; ++i) EXPECT_LT(palette[i - 1], palette[i]);
+    const BrickContent& content = bricks.content(word & kCellSlotMask);
+    ASSERT_TRUE(content.materials);
+    const auto& palette = content.materials->palette;
+    for (size_t i = 1; i < 16; ++i) EXPECT_LT(palette[i - 1], palette[i]);
     EXPECT_LT(palette[15], sdf::kNoMaterial);
     // A texel whose material is kept still names it.
-    BrickTexels texels;
-    const BrickRecord& record = bricks.field().records()[word & kCellSlotMask];
-    bake_brick(
-        bricks.field(),
-        {word & kCellSlotMask, {record.texel_x, record.texel_y, record.texel_z}, record.code_first, record.code_count},
-        texels);
-    EXPECT_EQ(texels.dropped, 9u);
+    EXPECT_EQ(content.dropped(), 9u);
     int named = 0;
     std::vector<int> texels_of(64, 0);  // hard unions: a texel has one material
     for (int i = 0; i < 512; ++i) {
@@ -347,20 +341,20 @@ TEST(HostBricks, APaletteKeepsTheSixteenHeaviestAndCountsTheRest) {
         sdf::MaterialMix mix;
         sdf::evaluate_materials(sdf::view(bricks.field().program()), {&p[0], &p[1], &p[2], 1}, &value, &mix);
         if (std::fabs(value / 0.05f) >= 4) {
-            EXPECT_EQ(texels.material[i], 0);
+            EXPECT_EQ(content.word(size_t(i)), 0);
             continue;
         }
         ++texels_of[mix.id0];
-        for (int slot = 0; slot < 16; ++slot) {
+        for (size_t slot = 0; slot < 16; ++slot) {
             if (palette[slot] != mix.id0) continue;
-            EXPECT_EQ(material_slot0(texels.material[i]), uint32_t(slot));
+            EXPECT_EQ(material_slot0(content.word(size_t(i))), uint32_t(slot));
             ++named;
         }
     }
     EXPECT_GT(named, 100);
     int lightest_kept = 512, heaviest_left = 0;
     for (int id = 0; id < 64; ++id) {
-        const bool kept = std::find(palette, palette + 16, uint32_t(id)) != palette + 16;
+        const bool kept = std::find(palette.begin(), palette.end(), uint32_t(id)) != palette.end();
         if (kept) lightest_kept = std::min(lightest_kept, texels_of[size_t(id)]);
         if (!kept) heaviest_left = std::max(heaviest_left, texels_of[size_t(id)]);
     }
@@ -378,9 +372,9 @@ TEST(HostBricks, FarEditsChangeNotOneBitOfABrick) {
         const uint32_t word = after.field().cell_word(r.texel_x / 7, r.texel_y / 7, r.texel_z / 7);
         ASSERT_NE(word & kCellOccupied, 0u);
         for (size_t i = 0; i < 512; ++i) {
-            ASSERT_EQ(before.materials()[slot * 512 + i], after.materials()[(word & kCellSlotMask) * 512 + i]);
-            ASSERT_EQ(before.distances()[slot * 1024 + 2 * i],
-                      after.distances()[(word & kCellSlotMask) * 1024 + 2 * i]);
+            const BrickContent &was = before.content(slot), &is = after.content(word & kCellSlotMask);
+            ASSERT_EQ(was.word(i), is.word(i));
+            ASSERT_EQ((*was.half)[i], (*is.half)[i]);
         }
         ++same;
     });

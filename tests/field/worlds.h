@@ -51,6 +51,47 @@ struct World {
     }
 };
 
+/// A program that follows a list of edits by rows, as a world does.
+class Live {
+public:
+    explicit Live(const std::vector<Edit>& edits) : edits_(edits) {
+        program_ = *compiled(edits);
+        for (uint32_t i = 0; i < edits.size(); ++i) rows_.push_back(i);
+    }
+    std::shared_ptr<const sdf::Program> program() const { return std::make_shared<const sdf::Program>(program_); }
+    /// What must change to make it the program of `edits`: rows between the common beginning and the common end.
+    std::vector<RowChange> become(const std::vector<Edit>& edits) {
+        const size_t most = std::min(edits.size(), edits_.size());
+        size_t first = 0, last = 0;
+        while (first < most && edits[first] == edits_[first]) ++first;
+        while (last < most - first && edits[edits.size() - 1 - last] == edits_[edits_.size() - 1 - last]) ++last;
+        std::vector<RowChange> changes;
+        for (size_t i = first; i < edits_.size() - last; ++i) {
+            program_.remove(rows_[i]);
+            changes.push_back({rows_[i], kNoRow});
+        }
+        rows_.erase(rows_.begin() + ptrdiff_t(first), rows_.end() - ptrdiff_t(last));
+        for (size_t i = first; i < edits.size() - last; ++i) {
+            const auto order_of = [&](size_t at) { return program_.edits[rows_[at]].order; };
+            const auto order = [&] {
+                return sdf::order_between(i > 0 ? order_of(i - 1) : 0, i < rows_.size() ? order_of(i) : UINT64_MAX);
+            };
+            if (order() == 0) program_.number_anew(rows_);
+            auto row = sdf::insert(program_, edits[i], {}, {}, order(), uint32_t(i));
+            EXPECT_TRUE(row) << (row ? "" : row.error().message);
+            rows_.insert(rows_.begin() + ptrdiff_t(i), *row);
+            changes.push_back({kNoRow, *row});
+        }
+        edits_ = edits;
+        return changes;
+    }
+
+private:
+    std::vector<Edit> edits_;
+    std::vector<uint32_t> rows_;
+    sdf::Program program_;
+};
+
 class Random {
 public:
     explicit Random(uint32_t seed) : engine_(seed) {}

@@ -20,18 +20,16 @@ struct Tally {
 Tally compare(GpuField& gpu, const field::Field& f) {
     Tally tally;
     const bool half = f.options().format == field::DistanceFormat::Half;
-    std::vector<uint32_t> slots;
-    for (uint32_t s = 0; s < f.slot_count(); ++s) {
-        if (f.records()[s].code_count != 0) slots.push_back(s);
-    }
+    const std::vector<uint32_t> slots = f.slots();
     const auto read = rhi::must(gpu.read_back(slots));
     const float h = f.grid().voxel_size;
     for (size_t i = 0; i < read.size(); ++i) {
         const field::BrickRecord& r = f.records()[slots[i]];
-        field::BrickTexels expected;
-        field::bake_brick(f, {slots[i], {r.texel_x, r.texel_y, r.texel_z}, r.code_first, r.code_count}, expected);
+        field::BrickEvaluator evaluator(f.program(), h);
+        evaluator.evaluate(f.code_of(slots[i]), {r.texel_x, r.texel_y, r.texel_z});
+        const field::BrickContent expected = evaluator.content(f.options().format);
         for (size_t t = 0; t < 512; ++t) {
-            const float d = expected.distance[t] / h;
+            const float d = evaluator.distances()[t] / h;
             const float want = half ? field::stored_half(d) : field::stored_snorm8(d);
             const float got =
                 half ? field::half_value(read[i].distance_codes[t]) : field::snorm8_value(read[i].distance_codes[t]);
@@ -46,12 +44,12 @@ Tally compare(GpuField& gpu, const field::Field& f) {
             tally.worst = std::max(tally.worst, double(off));
             // Near the band's end either side may call a texel far; weights may round the other way.
             if (std::fabs(d) > 3.99f) continue;
-            const uint32_t a = read[i].material_words[t], b = expected.material[t];
+            const uint32_t a = read[i].material_words[t], b = expected.word(t);
             const bool same = a == b || ((a & 255) == (b & 255) && std::abs(int(a >> 8) - int(b >> 8)) <= 1) ||
                               (a >> 8 <= 1 && b >> 8 <= 1 && (a & 15) == (b & 15));
             tally.words += !same;
         }
-        for (size_t k = 0; k < 16; ++k) tally.words += read[i].palette[k] != expected.palette[k] ? 1 : 0;
+        for (size_t k = 0; k < 16; ++k) tally.words += read[i].palette[k] != expected.palette(k) ? 1 : 0;
     }
     return tally;
 }
@@ -104,9 +102,10 @@ TEST_F(BakeGpu, AnEditBakesItsOwnBricksAlone) {
     GpuField gpu(*runner_);
     rhi::must(gpu.update(before, Baker::Storage));
     EXPECT_EQ(gpu.bricks_baked(), before->stats().bricks);
+    field::worlds::Live live(world.edits);
     world.edits.push_back(field::worlds::edit(Sphere{.radius = 0.1f}, {0.9f, 0.9f, 0.9f}));
-    const auto after = rhi::must(field::Field::update(*before, field::worlds::compiled(world.edits),
-                                                      std::vector<Box3>{{{0.7f, 0.7f, 0.7f}, {1.1f, 1.1f, 1.1f}}}));
+    const std::vector<field::RowChange> changes = live.become(world.edits);
+    const auto after = rhi::must(field::Field::update(*before, live.program(), changes));
     rhi::must(gpu.update(after, Baker::Storage));
     EXPECT_LT(gpu.bricks_baked(), before->stats().bricks / 4);
     EXPECT_GT(gpu.bricks_baked(), 0u);

@@ -107,8 +107,8 @@ TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
     const auto built = fresh.frame();
     ASSERT_TRUE(built);
     EXPECT_EQ(second->field->stats().bricks, built->field->stats().bricks);
-    for (const field::BrickRecord& r : built->field->records()) {
-        if (r.code_count == 0) continue;
+    for (const uint32_t slot : built->field->slots()) {
+        const field::BrickRecord& r = built->field->records()[slot];
         const int x = r.texel_x / field::kBrickVoxels, y = r.texel_y / field::kBrickVoxels,
                   z = r.texel_z / field::kBrickVoxels;
         EXPECT_NE(second->field->cell_word(x, y, z) & field::kCellOccupied, 0u);

@@ -148,15 +148,15 @@ double expect_rate(Random& random, const Scene& scene, int points) {
     for (int i = 0; i < points; ++i) {
         Point p;
         if (!outside_point(random, edit.bounds, size, p)) continue;
-        const double far = std::hypot(off(p[0], edit.bounds.min.x, edit.bounds.max.x),
-                                      off(p[1], edit.bounds.min.y, edit.bounds.max.y),
-                                      off(p[2], edit.bounds.min.z, edit.bounds.max.z));
+        const double far =
+            std::hypot(off(p[0], edit.bounds.min.x, edit.bounds.max.x), off(p[1], edit.bounds.min.y, edit.bounds.max.y),
+                       off(p[2], edit.bounds.min.z, edit.bounds.max.z));
         const double promised = double(edit.rate) * far;
         const double value = evaluate(view(*program), dvec3{p[0], p[1], p[2]});
         tightest = std::min(tightest, value / promised);
         if (value < promised * (1 - 1e-5) - 2e-5 * (size + magnitude(p)) * double(edit.rate)) {
-            RC_FAIL(describe(scene) + "\n at " + show(p) + ": " + std::to_string(value) + " < " + std::to_string(edit.rate) +
-                    " * " + std::to_string(far));
+            RC_FAIL(describe(scene) + "\n at " + show(p) + ": " + std::to_string(value) + " < " +
+                    std::to_string(edit.rate) + " * " + std::to_string(far));
         }
     }
     return tightest;
@@ -245,7 +245,6 @@ Scene folded(Op op, float blend_radius, const std::vector<Node>& children) {
     return scene;
 }
 
-
 TEST(Rate, RoundOfASqueezedBallReachesFarther) {
     Scene scene;
     Object squeezed;
@@ -283,14 +282,15 @@ TEST(Rate, DisplacedGroundGrowsByItsFactorSlower) {
 }
 
 TEST(Rate, AnIntersectionsBoxIsFartherThanAnyOfItsOperands) {
-    const Scene scene = folded(Op::Intersect, 0, {shaped(Box{.half_extents = {0.2f, 2, 2}}),
-                                                  shaped(Box{.half_extents = {2, 0.2f, 2}}),
-                                                  shaped(Box{.half_extents = {2, 2, 0.2f}})});
+    const Scene scene = folded(Op::Intersect, 0,
+                               {shaped(Box{.half_extents = {0.2f, 2, 2}}), shaped(Box{.half_extents = {2, 0.2f, 2}}),
+                                shaped(Box{.half_extents = {2, 2, 0.2f}})});
     const auto program = compile(scene.source());
     EXPECT_NEAR(program->edits[0].rate, 1 / std::sqrt(3.0f), 1e-6f);
     EXPECT_NEAR(evaluate(view(*program), dvec3{1.2, 1.2, 1.2}), 1, 1e-6) << "sqrt(3) from the box";
     for_all("corner", [&](Random& random) { expect_rate(random, scene, 200); });
-    const Scene one = folded(Op::Intersect, 0, {shaped(Sphere{.radius = 2}), shaped(Box{.half_extents = {0.2f, 0.2f, 0.2f}})});
+    const Scene one =
+        folded(Op::Intersect, 0, {shaped(Sphere{.radius = 2}), shaped(Box{.half_extents = {0.2f, 0.2f, 0.2f}})});
     EXPECT_EQ(compile(one.source())->edits[0].rate, 1) << "every face is the box's";
 }
 

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: MIT
+#include "field/brick_content.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace kiln::field {
+namespace {
+
+constexpr size_t kPalette = size_t(kPaletteSize);
+
+// Distinct materials of a brick and how much of it they make up, in 510ths of a texel: whole numbers, so in any order.
+class PaletteBuilder {
+public:
+    void add(uint16_t id, uint32_t weight) {
+        for (Entry& entry : entries_) {
+            if (entry.id != id) continue;
+            entry.weight += weight;
+            return;
+        }
+        entries_.push_back({id, weight});
+    }
+
+    // The 16 heaviest, ties to the lower number, in ascending order; the number left out.
+    uint32_t finish(std::array<uint32_t, kPalette>& palette) {
+        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) {
+            return a.weight != b.weight ? a.weight > b.weight : a.id < b.id;
+        });
+        const uint32_t kept = uint32_t(std::min(entries_.size(), kPalette));
+        const uint16_t heaviest = entries_.empty() ? uint16_t(0) : entries_[0].id;
+        const uint32_t left_out = uint32_t(entries_.size()) - kept;
+        entries_.resize(kept);
+        std::sort(entries_.begin(), entries_.end(), [](const Entry& a, const Entry& b) { return a.id < b.id; });
+        for (uint32_t i = 0; i < kPalette; ++i) palette[i] = i < kept ? entries_[i].id : sdf::kNoMaterial;
+        heaviest_slot_ = std::max(slot_of(heaviest), 0);
+        return left_out;
+    }
+
+    int slot_of(uint16_t id) const {
+        for (size_t i = 0; i < entries_.size(); ++i) {
+            if (entries_[i].id == id) return int(i);
+        }
+        return -1;
+    }
+    int heaviest_slot() const { return heaviest_slot_; }
+    void clear() { entries_.clear(); }
+
+private:
+    struct Entry {
+        uint16_t id;
+        uint32_t weight;
+    };
+    std::vector<Entry> entries_;
+    int heaviest_slot_ = 0;
+};
+
+uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; }
+
+}  // namespace
+
+float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 first) {
+    code_ = code;
+    for (int i = 0; i < kBrickTexels; ++i) {
+        x_[i] = float(first.x + i) * voxel_size_;  // never origin + i * h: neighbours must see the same position
+        y_[i] = float(first.y + i) * voxel_size_;
+        z_[i] = float(first.z + i) * voxel_size_;
+    }
+    return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
+}
+
+BrickContent BrickEvaluator::content(DistanceFormat format) {
+    BrickContent out;
+    if (format == DistanceFormat::Half) {
+        sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, out.half.renew().data());
+    } else {
+        ByteCodes& codes = out.bytes.renew();
+        for (size_t i = 0; i < codes.size(); ++i) codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
+    }
+    if (const auto only = only_material()) {
+        out.material = *only;
+    } else {
+        BrickMaterials made = materials();
+        // Texels of one material need no words.
+        const bool one = made.palette[1] == sdf::kNoMaterial &&
+                         std::all_of(made.words.begin(), made.words.end(), [](uint16_t word) { return word == 0; });
+        if (one && made.palette[0] != sdf::kNoMaterial) {
+            out.material = uint16_t(made.palette[0]);
+        } else {
+            out.materials = Shared<BrickMaterials>::make(std::move(made));
+        }
+    }
+    return out;
+}
+
+// Where all leaves of the code that have a material have the same, so has every texel: what has none shows another's.
+std::optional<uint16_t> BrickEvaluator::only_material() const {
+    std::optional<uint16_t> out;
+    for (const sdf::Instruction in : code_) {
+        if (in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Constant) continue;
+        const uint16_t id = uint16_t(program_->params[in.param + 1]);
+        if (id == sdf::kNoMaterial) continue;
+        if (out && *out != id) return std::nullopt;
+        out = id;
+    }
+    return out.value_or(uint16_t(sdf::kDefaultMaterial));
+}
+
+BrickMaterials BrickEvaluator::materials() const {
+    constexpr size_t kTexels = size_t(kBrickTexelCount);
+    thread_local std::vector<float> points(3 * kTexels), values(kTexels);
+    thread_local std::vector<sdf::MaterialMix> mixes(kTexels);
+    for (size_t i = 0; i < kTexels; ++i) {
+        points[i] = x_[i & 7];
+        points[kTexels + i] = y_[i >> 3 & 7];
+        points[2 * kTexels + i] = z_[i >> 6];
+    }
+    sdf::evaluate_materials(sdf::view(*program_, code_),
+                            {points.data(), points.data() + kTexels, points.data() + 2 * kTexels, kBrickTexelCount},
+                            values.data(), mixes.data());
+
+    BrickMaterials out;
+    thread_local PaletteBuilder palette;
+    palette.clear();
+    const auto in_band = [&](size_t i) { return std::fabs(distances_[i] * voxels_per_metre_) < kBandVoxels; };
+    for (size_t i = 0; i < kTexels; ++i) {
+        if (!in_band(i)) continue;
+        const uint32_t second = material_word(0, 0, mixes[i].weight) >> 8;
+        palette.add(known(mixes[i].id0), 510 - second);
+        if (second != 0) palette.add(known(mixes[i].id1), second);
+    }
+    out.dropped = palette.finish(out.palette);
+    for (size_t i = 0; i < kTexels; ++i) {
+        out.words[i] = 0;
+        if (!in_band(i)) continue;
+        const sdf::MaterialMix& mix = mixes[i];
+        int slot0 = palette.slot_of(known(mix.id0));
+        int slot1 = mix.weight > 0 ? palette.slot_of(known(mix.id1)) : slot0;
+        const bool both = slot0 >= 0 && slot1 >= 0;
+        if (slot0 < 0) slot0 = slot1 >= 0 ? slot1 : palette.heaviest_slot();
+        if (!both) slot1 = slot0;
+        out.words[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot1), both ? mix.weight : 0.0f));
+        if (out.words[i] >> 8 == 0) out.words[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot0), 0.0f));
+    }
+    return out;
+}
+
+}  // namespace kiln::field

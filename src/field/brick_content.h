@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: MIT
+// What is in a brick, made on the CPU from its pruned code: texel positions, distances, the codes and materials that are stored.
+#pragma once
+
+#include "base/shared.h"
+#include "field/brick.gpu.h"
+#include "field/codes.gpu.h"
+#include "sdf/eval.h"
+
+#include <array>
+#include <optional>
+
+namespace kiln::field {
+
+/// How texels store distance. Half: 16-bit float of voxels; Snorm8: 8-bit, band / 127 a step.
+enum class DistanceFormat : uint8_t { Half, Snorm8 };
+
+/// 512 codes each, x fastest, then y, then z.
+using HalfCodes = std::array<uint16_t, kBrickTexelCount>;
+using ByteCodes = std::array<uint8_t, kBrickTexelCount>;
+
+/// Materials of a brick with more than one: a word a texel (codes.gpu.h), 0 outside the band where no surface asks; 16 material numbers,
+/// ascending, the unused ones kNoMaterial.
+struct BrickMaterials {
+    std::array<uint16_t, kBrickTexelCount> words;
+    std::array<uint32_t, kPaletteSize> palette;
+    uint32_t dropped = 0;  ///< materials that found no place in the palette
+};
+
+/// A brick's texels as stored: codes of one of the two formats, and materials, or the one material of all its texels.
+struct BrickContent {
+    Shared<HalfCodes> half;
+    Shared<ByteCodes> bytes;
+    Shared<BrickMaterials> materials;
+    uint16_t material = 0;
+
+    explicit operator bool() const { return half || bytes; }
+    float distance(size_t texel) const { return half ? half_value((*half)[texel]) : snorm8_value((*bytes)[texel]); }
+    uint16_t word(size_t texel) const { return materials ? materials->words[texel] : uint16_t(0); }
+    uint32_t palette(size_t slot) const {
+        return materials ? materials->palette[slot] : slot == 0 ? uint32_t(material) : sdf::kNoMaterial;
+    }
+    uint32_t dropped() const { return materials ? materials->dropped : 0; }
+};
+
+/// Evaluates bricks, one after another. One thread.
+class BrickEvaluator {
+public:
+    BrickEvaluator(const sdf::Program& program, float voxel_size)
+        : program_(&program), voxel_size_(voxel_size), voxels_per_metre_(1.0f / voxel_size) {}
+
+    /// Distances of the texels of the brick that begins at global texel `first`; the smallest |distance|, metres.
+    float evaluate(std::span<const sdf::Instruction> code, ivec3 first);
+    /// Of the last evaluate(), metres, not clamped.
+    const std::array<float, kBrickTexelCount>& distances() const { return distances_; }
+    /// Of the last evaluate(): what is stored.
+    BrickContent content(DistanceFormat format);
+
+private:
+    std::optional<uint16_t> only_material() const;
+    BrickMaterials materials() const;
+
+    const sdf::Program* program_;
+    float voxel_size_, voxels_per_metre_;
+    std::span<const sdf::Instruction> code_;
+    alignas(64) float x_[kBrickTexels], y_[kBrickTexels], z_[kBrickTexels];
+    alignas(64) std::array<float, kBrickTexelCount> distances_;
+};
+
+}  // namespace kiln::field

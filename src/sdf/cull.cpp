@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: MIT
+#include "sdf/cull.h"
+
+#include "base/assert.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace kiln::sdf {
+namespace {
+
+constexpr float kInfinite = std::numeric_limits<float>::infinity();
+
+bool is_tree(std::span<const Instruction> code) {
+    return std::any_of(code.begin(), code.end(), [](Instruction in) { return in.opcode() >= Opcode::Combine; });
+}
+
+}  // namespace
+
+std::span<const Instruction> ListCuller::code_of(const Entry& entry) const {
+    return entry.made ? std::span(code_).subspan(entry.code_first, entry.code_count)
+                      : program_->code.subspan(entry.code_first, entry.code_count);
+}
+
+ListCuller::List ListCuller::list_of(std::span<const uint32_t> rows) {
+    List out{entries_.size(), rows.size(), code_.size(), true};
+    for (const uint32_t row : rows) {
+        const EditSpan& span = program_->edits[row];
+        const uint32_t count = span.count - 1;
+        entries_.push_back(
+            {row, span.first, count, FoldEntry::Combine, false, is_tree(program_->code.subspan(span.first, count))});
+    }
+    return out;
+}
+
+void ListCuller::fold(Fold& fold) {
+    const size_t n = fold.list.count;
+    fold_entries_.clear();
+    const float far = fold.balls.far;
+    if (std::isfinite(far)) {
+        BlendAllowance allowance;
+        for (const Entry& entry : std::span(entries_).subspan(fold.list.first, n))
+            allowance.add(program_->edits[entry.row].reach);
+        fold.balls.far += allowance.metres();
+    }
+    for (const Entry& entry : std::span(entries_).subspan(fold.list.first, n)) {
+        const EditSpan& span = program_->edits[entry.row];
+        const std::span<const Instruction> code = code_of(entry);
+        FoldEntry f{reinterpret_cast<const uint32_t*>(code.data()),
+                    uint32_t(code.size()),
+                    span.blend,
+                    span.reach,
+                    uint8_t(span.op),
+                    entry.join,
+                    {0, 0, 0},
+                    {kInfinite, kInfinite, kInfinite}};
+        if (std::isfinite(fold.balls.far) && !span.everywhere()) {
+            const Box3 box = span.indexed(entry.row).influence(fold.balls.far);
+            const vec3 middle = box.center(), half = box.half_extents();
+            f = {f.code,
+                 f.code_count,
+                 f.blend,
+                 f.reach,
+                 f.op,
+                 f.join,
+                 {middle.x, middle.y, middle.z},
+                 {half.x, half.y, half.z}};
+        }
+        fold_entries_.push_back(f);
+    }
+    fold.left.resize(n);
+    fold.right.resize(n);
+    fold_list(fold_entries_, numbers_, fold.balls, fold.left.data(), fold.right.data(), fold.value);
+    fold.balls.far = far;
+}
+
+// From the last edit to the first, as prune() walks its tape: a ball needs what comes before as a value, for its material, or not.
+void ListCuller::keep(Fold& fold, uint64_t live) {
+    const size_t n = fold.list.count;
+    fold.joined.assign(n, 0);
+    fold.won.assign(n, 0);
+    fold.shown.assign(n, 0);
+    uint64_t value = live, material = 0;
+    for (size_t i = n; i-- > 0 && (value | material) != 0;) {
+        const Entry& entry = entries_[fold.list.first + i];
+        const uint64_t won = (value | material) & fold.right[i];
+        const uint64_t joined = (value | material) & ~(fold.left[i] | fold.right[i]);
+        fold.joined[i] = joined;
+        fold.won[i] = won & value;
+        fold.shown[i] = won & material;
+        value = (value & ~won) | joined;
+        material &= ~(won | joined);
+        if (won != 0 && join_of(entry, true) == FoldEntry::Take) material |= won;
+    }
+    fold.from_empty = fold.list.from_empty ? value | material : 0;
+}
+
+// What becomes of an edit's Combine in a ball where the edit alone wins.
+FoldEntry::Join ListCuller::join_of(const Entry& entry, bool won) const {
+    if (!won || entry.join != FoldEntry::Combine) return entry.join;
+    const EditSpan& span = program_->edits[entry.row];
+    const Instruction combine = program_->code[span.first + span.count - 1];
+    if ((combine.aux() & kMayLackMaterial) != 0) return FoldEntry::Take;
+    return span.op == Op::Subtract ? FoldEntry::Negate : FoldEntry::Move;
+}
+
+void ListCuller::write_content(const Entry& entry, vec3 center, float radius, bool whole,
+                               std::vector<Instruction>& out) {
+    const std::span<const Instruction> code = code_of(entry);
+    if (entry.tree) {
+        // A copy: `out` may be where the code lies.
+        const std::vector<Instruction> source(code.begin(), code.end());
+        prune_edit({source, numbers_.params, numbers_.samples}, center, radius, whole, out, prune_);
+        return;
+    }
+    if (whole) {
+        const size_t at = out.size();
+        out.resize(at + code.size());
+        std::copy_n(code_of(entry).begin(), code.size(), out.begin() + std::ptrdiff_t(at));
+        return;
+    }
+    const auto shape = std::find_if(code.begin(), code.end(), [](Instruction in) {
+        return in.opcode() == Opcode::Shape || in.opcode() == Opcode::Constant;
+    });
+    KILN_ASSERT(shape != code.end(), "edit {} has no shape", entry.row);
+    out.push_back(Instruction::make(Opcode::Constant, 0, 1, 0, 0, shape->param));
+}
+
+void ListCuller::write_join(const Entry& entry, FoldEntry::Join join, std::vector<Instruction>& out) const {
+    const EditSpan& span = program_->edits[entry.row];
+    switch (join) {
+    case FoldEntry::Combine:
+        out.push_back(program_->code[span.first + span.count - 1]);
+        break;
+    case FoldEntry::Take:
+        out.push_back(Instruction::make(Opcode::Take, span.op == Op::Subtract ? 1u : 0u, 0, 0, 1, 0));
+        break;
+    case FoldEntry::Move:
+        out.push_back(Instruction::make(Opcode::Move, 0, 0, 1, 0, 0));
+        break;
+    case FoldEntry::Negate:
+        out.push_back(Instruction::make(Opcode::Negate, 0, 0, 1, 0, 0));
+        break;
+    }
+}
+
+ListCuller::List ListCuller::child(const Fold& fold, int ball) {
+    const uint64_t bit = uint64_t(1) << ball;
+    List out{entries_.size(), 0, code_.size(), (fold.from_empty & bit) != 0};
+    for (size_t i = 0; i < fold.list.count; ++i) {
+        const bool shown = (fold.shown[i] & bit) != 0, won = shown || (fold.won[i] & bit) != 0;
+        if (!won && (fold.joined[i] & bit) == 0) continue;
+        Entry entry = entries_[fold.list.first + i];
+        if (entry.tree || shown) {
+            const uint32_t at = uint32_t(code_.size());
+            write_content(entry, fold.balls.center(ball), fold.balls.radius, !shown, code_);
+            entry.code_first = at;
+            entry.code_count = uint32_t(code_.size()) - at;
+            entry.made = true;
+            entry.tree = entry.tree && is_tree(code_of(entry));
+        }
+        entry.join = join_of(entry, won);
+        entries_.push_back(entry);
+    }
+    out.count = entries_.size() - out.first;
+    return out;
+}
+
+void ListCuller::emit(const Fold& fold, int ball, std::vector<Instruction>& out) {
+    const uint64_t bit = uint64_t(1) << ball;
+    out.clear();
+    if ((fold.from_empty & bit) != 0) out.push_back(Instruction::make(Opcode::Empty, 0, 0, 0, 0, 0));
+    for (size_t i = 0; i < fold.list.count; ++i) {
+        const bool shown = (fold.shown[i] & bit) != 0, won = shown || (fold.won[i] & bit) != 0;
+        if (!won && (fold.joined[i] & bit) == 0) continue;
+        const Entry& entry = entries_[fold.list.first + i];
+        write_content(entry, fold.balls.center(ball), fold.balls.radius, !shown, out);
+        write_join(entry, join_of(entry, won), out);
+    }
+}
+
+void ListCuller::drop(const List& list) {
+    entries_.resize(list.first);
+    code_.resize(list.code);
+}
+
+uint64_t ListCuller::balls_with(const Fold& fold, std::span<const uint32_t> rows) const {
+    uint64_t out = 0;
+    for (size_t i = 0; i < fold.list.count; ++i) {
+        if (std::find(rows.begin(), rows.end(), entries_[fold.list.first + i].row) == rows.end()) continue;
+        out |= fold.joined[i] | fold.won[i] | fold.shown[i];
+    }
+    return out;
+}
+
+}  // namespace kiln::sdf

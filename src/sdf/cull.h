@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// Culling of edit lists, 64 balls at a time: which edits can matter in each, and the pruned code of each. What sdf::prune does for one
+// ball and a tape, at the speed of the lanes: edits are folded at all centres at once, what each ball needs is found with one bit a
+// ball, and only edits that are trees are pruned inside one by one. Where Balls::far is infinite its code is prune()'s, instruction for
+// instruction; else edits that are nowhere within `far` in the ball are left out too, and values beyond `far` only stay beyond it.
+#pragma once
+
+#include "sdf/eval.h"
+#include "sdf/prune.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace kiln::sdf {
+
+/// One thread's culling of one program. Lists live on a stack: what was made last is dropped first.
+class ListCuller {
+public:
+    explicit ListCuller(const Program& program) : program_(&program), numbers_(numbers_of(program)) {}
+
+    struct List {
+        size_t first = 0, count = 0;  ///< entries
+        size_t code = 0;              ///< where the code that was made for it begins
+        bool from_empty = true;       ///< begins with empty space
+    };
+    /// What folding a list says; reused between calls.
+    struct Fold {
+        List list;
+        Balls balls;
+        alignas(64) float value[64];        ///< at the centres, metres
+        std::vector<uint64_t> left, right;  ///< by entry: who wins
+        std::vector<uint64_t> joined, won,
+            shown;  ///< by entry: kept as it is; kept and what was before it dropped; for its material only
+        uint64_t from_empty = 0;  ///< needs the empty space before the first entry
+    };
+
+    /// The list of these rows, which are in order.
+    List list_of(std::span<const uint32_t> rows);
+    /// Fills value, left and right; list and balls are the caller's.
+    void fold(Fold& fold);
+    /// Then, for the balls in `live`: what each keeps.
+    void keep(Fold& fold, uint64_t live);
+    /// Then, for one ball: its list, or its code (replacing `out`).
+    List child(const Fold& fold, int ball);
+    void emit(const Fold& fold, int ball, std::vector<Instruction>& out);
+    /// Drops `list` and all lists made after it.
+    void drop(const List& list);
+
+    /// After keep(): the balls in whose code an edit of `rows` is.
+    uint64_t balls_with(const Fold& fold, std::span<const uint32_t> rows) const;
+
+private:
+    struct Entry {
+        uint32_t row;
+        uint32_t code_first, code_count;
+        FoldEntry::Join join;
+        bool made;  // the code was made for this list; else it is the program's
+        bool tree;  // has something to prune inside
+    };
+    static TapeView numbers_of(const Program& program) { return {{}, program.params.data(), program.samples.data()}; }
+    std::span<const Instruction> code_of(const Entry& entry) const;
+    FoldEntry::Join join_of(const Entry& entry, bool won) const;
+    void write_content(const Entry& entry, vec3 center, float radius, bool whole, std::vector<Instruction>& out);
+    void write_join(const Entry& entry, FoldEntry::Join join, std::vector<Instruction>& out) const;
+
+    const Program* program_;
+    TapeView numbers_;
+    std::vector<Entry> entries_;
+    std::vector<Instruction> code_;
+    std::vector<FoldEntry> fold_entries_;
+    PruneScratch prune_;
+};
+
+}  // namespace kiln::sdf

@@ -1,0 +1,270 @@
+// SPDX-License-Identifier: MIT
+// Lists of edits at many places at once, for one float instruction set: which of them can matter in each of 64 balls (fold_list), and
+// what a whole brick's 512 texels are (evaluate_brick). Needs eval_lanes.inl and eval_entry.inl.
+// A brick's tape is mostly [point] [shape] [combine] of one edit after another. Those of common shapes run over the whole brick in
+// one loop, z innermost, so that what does not depend on z is hoisted; everything else runs slice by slice through the interpreter.
+// Both give the bits of evaluate_points().
+
+// Lanes where m holds, one bit each; see each including file.
+static inline uint64_t chunk_bits(const mask* m) {
+    uint64_t out = 0;
+    for (int i = 0; i < KILN_VECTORS; ++i) out |= uint64_t(lane_bits(m[i])) << (i * (kChunkPoints / KILN_VECTORS));
+    return out;
+}
+
+// See sdf/eval.h.
+void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples, const Balls& balls, uint64_t* left,
+               uint64_t* right, float* value) {
+    Registers r;
+    load_chunk(r, balls.x, balls.y, balls.z, kChunkPoints);
+    Chunk ball;  // what rounding is counted from: largest coordinate of the centre, and the radius
+    for (int i = 0; i < KILN_VECTORS; ++i) {
+        const real3 p = point_at(r.cell, i);
+        ball.v[i] = max(abs(p.x), max(abs(p.y), abs(p.z))) + param(balls.radius);
+        r.value[0].v[i] = real(param(kEmpty));
+    }
+    const mask never = lt(real(param(1)), real(param(0)));
+    const bool has_far = balls.far < 1e30f;
+    for (size_t at = 0; at < count; ++at) {
+        const FoldEntry& e = entries[at];
+        run_distance(r, e.code, e.code_count, params, Samples{samples});
+        Chunk& running = r.value[0];
+        const Chunk& other = r.value[1];
+        if (e.join != FoldEntry::Combine) {
+            const bool negated = e.join == FoldEntry::Negate || (e.join == FoldEntry::Take && e.op == 1);
+            for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = negated ? -other.v[i] : other.v[i];
+            left[at] = 0;
+            right[at] = ~uint64_t(0);
+            continue;
+        }
+        const real slack = real(param(2.0f * balls.radius + e.reach));
+        const real limit = real(param(balls.far + balls.radius + e.reach));
+        mask wins_left[KILN_VECTORS], wins_right[KILN_VECTORS];
+        for (int i = 0; i < KILN_VECTORS; ++i) {
+            const real a = running.v[i], b = other.v[i];
+            const real rounding = param(kPruneUlps) * (ball.v[i] + abs(a) + abs(b));
+            const real all = slack + rounding;
+            const real operand = e.op == 1 ? -b : b;
+            const real gap = e.op == 0 ? operand - a : a - operand;
+            wins_left[i] = e.op == 3 ? gt(b, all) : gt(gap, all);
+            wins_right[i] = e.op == 3 ? never : gt(-gap, all);
+            if (!has_far) continue;
+            const real beyond = limit + rounding;
+            const real3 p = point_at(r.cell, i);
+            mask away = either(gt(abs(p.x - param(e.middle[0])), real(param(balls.half_side + e.half[0]))),
+                               gt(abs(p.y - param(e.middle[1])), real(param(balls.half_side + e.half[1]))));
+            away = either(away, gt(abs(p.z - param(e.middle[2])), real(param(balls.half_side + e.half[2]))));
+            if (e.op != 2) away = either(away, gt(b, beyond));
+            if (e.op == 1 || e.op == 2) away = either(away, gt(a, beyond));  // nothing there to cut
+            const mask alone = e.op == 0 ? gt(a, beyond) : never;
+            wins_left[i] = either(wins_left[i], away);
+            wins_right[i] = both(either(wins_right[i], alone), no(wins_left[i]));
+        }
+        left[at] = chunk_bits(wins_left);
+        right[at] = chunk_bits(wins_right);
+        const param k = param(e.blend);
+        switch (e.op) {
+            case 0:
+                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(0, running.v[i], other.v[i], k);
+                break;
+            case 1:
+                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(1, running.v[i], other.v[i], k);
+                break;
+            case 2:
+                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(2, running.v[i], other.v[i], k);
+                break;
+            default: break;
+        }
+    }
+    store_chunk(r.value[0], value, kChunkPoints);
+}
+
+static constexpr int kSliceVectors = KILN_VECTORS;  // of a slice of 8 x 8 texels
+static constexpr int kBrickSlices = 8;
+
+struct BrickPoints {
+    real x[kSliceVectors], y[kSliceVectors];
+    param z[kBrickSlices];
+};
+struct BrickValues {
+    real v[kBrickSlices][kSliceVectors];
+};
+
+// How a leaf's value meets the running one.
+struct JoinSet {
+    KILN_SDF real join(real, real d, param) { return d; }
+};
+struct JoinNegated {
+    KILN_SDF real join(real, real d, param) { return -d; }
+};
+// k = 0: op_distance() with its zeros left out, which changes no bit.
+struct JoinUnion {
+    KILN_SDF real join(real a, real d, param) { return min(a, d); }
+};
+struct JoinSubtract {
+    KILN_SDF real join(real a, real d, param) { return -min(-a, d); }
+};
+template <int kOp>
+struct JoinSmooth {
+    KILN_SDF real join(real a, real d, param k) { return op_distance(kOp, a, d, k); }
+};
+
+template <uint32_t kShape, typename Join>
+static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, BrickValues& values, const float* t, const float* w, float k) {
+    const param tx = param(t[0]), ty = param(t[1]), tz = param(t[2]), scale = param(w[0]);
+    for (int i = 0; i < kSliceVectors; ++i) {
+        const real x = points.x[i] - tx, y = points.y[i] - ty;
+        for (int slice = 0; slice < kBrickSlices; ++slice) {
+            const real3 p(x, y, real(points.z[slice] - tz));
+            const real d = shape_distance(kShape, p, w + 3, Samples{nullptr}) * scale;
+            values.v[slice][i] = Join::join(values.v[slice][i], d, param(k));
+        }
+    }
+}
+
+using BrickLeaf = void (*)(const BrickPoints&, BrickValues&, const float*, const float*, float);
+
+// By shape (those worth their machine code), then by join.
+template <uint32_t kShape>
+static BrickLeaf leaf_of(int join) {
+    switch (join) {
+        case 0: return &brick_leaf<kShape, JoinUnion>;
+        case 1: return &brick_leaf<kShape, JoinSubtract>;
+        case 2: return &brick_leaf<kShape, JoinSmooth<0>>;
+        case 3: return &brick_leaf<kShape, JoinSmooth<1>>;
+        case 4: return &brick_leaf<kShape, JoinSet>;
+        default: return &brick_leaf<kShape, JoinNegated>;
+    }
+}
+
+// The leaf of [point] [shape] [combine, move, negate or take] at `code`, when it is one of those that run over the whole brick.
+static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* params, const float*& t, float& k) {
+    static const float kOrigin[3] = {0, 0, 0};
+    if (left < 3) return nullptr;
+    const Opcode point = Opcode(code[0] & 15u), shape = Opcode(code[2] & 15u), join = Opcode(code[4] & 15u);
+    if (shape != Opcode::Shape || ((code[2] >> 12) & 31u) != 1u) return nullptr;
+    if (point == Opcode::PointTranslate) {
+        t = params + code[1];
+    } else if (point == Opcode::PointCell) {
+        t = kOrigin;
+    } else {
+        return nullptr;
+    }
+    const uint32_t dst = (code[4] >> 12) & 31u, a = (code[4] >> 17) & 31u, b = (code[4] >> 22) & 31u, aux = (code[4] >> 4) & 255u;
+    int how = -1;
+    k = 0;
+    if (join == Opcode::Combine && dst == 0 && a == 0 && b == 1 && (aux & 3u) < 2u) {
+        k = params[code[5]];
+        how = int(aux & 3u) + (k > 0 ? 2 : 0);
+    } else if (join == Opcode::Move && dst == 0 && a == 1) {
+        how = 4;
+    } else if (join == Opcode::Negate && dst == 0 && a == 1) {
+        how = 5;
+    } else if (join == Opcode::Take && dst == 0 && b == 1) {
+        how = aux == 1u ? 5 : 4;
+    }
+    if (how < 0) return nullptr;
+    switch ((code[2] >> 4) & 255u) {
+        case kFusedSphere: return leaf_of<kFusedSphere>(how);
+        case kFusedBox: return leaf_of<kFusedBox>(how);
+        default: return nullptr;
+    }
+}
+
+// Texel (i, j, k) is at (x[i], y[j], z[k]); out[(k * 8 + j) * 8 + i]. Returns the smallest |value|.
+float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
+                     const float* z, float* out) {
+    alignas(64) float row_x[kChunkPoints], row_y[kChunkPoints];
+    for (int i = 0; i < kChunkPoints; ++i) {
+        row_x[i] = x[i & 7];
+        row_y[i] = y[i >> 3];
+    }
+    BrickPoints points;
+    constexpr int kLanes = kChunkPoints / KILN_VECTORS;
+    for (int i = 0; i < kSliceVectors; ++i) {
+        points.x[i] = load(row_x + i * kLanes);
+        points.y[i] = load(row_y + i * kLanes);
+    }
+    for (int slice = 0; slice < kBrickSlices; ++slice) points.z[slice] = param(z[slice]);
+
+    BrickValues values;
+    size_t pc = 0;
+    if (count > 0 && Opcode(code[0] & 15u) == Opcode::Empty && ((code[0] >> 12) & 31u) == 0u) pc = 1;
+    for (int slice = 0; slice < kBrickSlices; ++slice) {
+        for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = real(param(kEmpty));
+    }
+    Registers r;
+    while (pc < count) {
+        const float* t;
+        float k;
+        if (const BrickLeaf leaf = fused_leaf(code + 2 * pc, count - pc, params, t, k)) {
+            leaf(points, values, t, params + code[2 * pc + 3], k);
+            pc += 3;
+            continue;
+        }
+        // To the end of this edit: the next instruction that makes R0.
+        size_t end = pc;
+        while (end < count) {
+            const uint32_t word = code[2 * end++];
+            if (Opcode(word & 15u) > Opcode::PointClamp && ((word >> 12) & 31u) == 0u) break;
+        }
+        for (int slice = 0; slice < kBrickSlices; ++slice) {
+            for (int i = 0; i < kSliceVectors; ++i) {
+                r.cell[0].v[i] = points.x[i];
+                r.cell[1].v[i] = points.y[i];
+                r.cell[2].v[i] = real(points.z[slice]);
+                r.value[0].v[i] = values.v[slice][i];
+            }
+            run_distance(r, code + 2 * pc, end - pc, params, Samples{samples});
+            for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = r.value[0].v[i];
+        }
+        pc = end;
+    }
+    real nearest = abs(values.v[0][0]);
+    for (int slice = 0; slice < kBrickSlices; ++slice) {
+        for (int i = 0; i < kSliceVectors; ++i) {
+            nearest = min(nearest, abs(values.v[slice][i]));
+            store(out + (slice * kSliceVectors + i) * kLanes, values.v[slice][i]);
+        }
+    }
+    float lanes[kLanes];
+    store(lanes, nearest);
+    float least = lanes[0];
+    for (int i = 1; i < kLanes; ++i) least = lanes[i] < least ? lanes[i] : least;
+    return least;
+}
+
+#ifdef KILN_LANES
+static inline lane_u word_bits(real v) { return lane_u(v.v); }
+static inline lane_u choose(mask m, lane_u a, lane_u b) { return m.v ? a : b; }
+typedef uint16_t lane_h __attribute__((vector_size(2 * KILN_LANES)));
+static inline void store_words(uint16_t* to, lane_u words) {
+    const lane_h narrow = __builtin_convertvector(words, lane_h);
+    __builtin_memcpy(to, &narrow, sizeof narrow);
+}
+static inline lane_u all_words(uint32_t w) { return lane_u{} + w; }
+#else
+static inline uint32_t word_bits(real v) { return __builtin_bit_cast(uint32_t, v); }
+static inline uint32_t choose(mask m, uint32_t a, uint32_t b) { return m ? a : b; }
+static inline void store_words(uint16_t* to, uint32_t word) { *to = uint16_t(word); }
+static inline uint32_t all_words(uint32_t w) { return w; }
+#endif
+
+// See store_halves() in sdf/eval.h. Integer arithmetic, to nearest, ties to even.
+void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes) {
+    constexpr size_t kLanes = kChunkPoints / KILN_VECTORS;
+    const real zero = real(param(0));
+    const auto rounded = [](real size) {
+        const auto bits = word_bits(size) - 0x38000000u;  // exponent bias 127 -> 15
+        return (bits + 0x0fffu + ((bits >> 13) & 1u)) >> 13;
+    };
+    const auto at_limit = rounded(real(param(limit))), at_least = rounded(real(param(least)));
+    for (size_t i = 0; i < count; i += kLanes) {
+        const real v = load(values + i) * param(scale);
+        const real size = abs(v);
+        auto code = choose(lt(size, real(param(limit))), rounded(size), at_limit);  // NaN is not below it
+        code = choose(lt(size, real(param(least))), at_least, code);
+        code = choose(le(size, zero), all_words(0), code) | choose(lt(v, zero), all_words(0x8000u), all_words(0));
+        store_words(codes + i, code);
+    }
+}
