@@ -4,7 +4,7 @@
 // belongs to one thread at a time.
 #pragma once
 
-#include "base/assert.h"
+#include "base/block_pool.h"
 
 #include <atomic>
 #include <cstdint>
@@ -18,6 +18,7 @@ public:
     Shared() = default;
     template <typename... Args>
     static Shared make(Args&&... args) {
+        static_assert(alignof(T) <= kBlockAlign);
         Shared out;
         out.box_ = new Box{{1}, T{std::forward<Args>(args)...}};
         return out;
@@ -60,6 +61,9 @@ private:
     struct Box {
         std::atomic<uint32_t> holders;
         T value;
+
+        static void* operator new(size_t size) { return take_block(size); }
+        static void operator delete(void* box, size_t size) { give_block(box, size); }
     };
     Box* box_ = nullptr;
 };

@@ -69,7 +69,7 @@ float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 fir
     return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
 }
 
-BrickContent BrickEvaluator::content(DistanceFormat format) {
+BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16_t> only) const {
     BrickContent out;
     if (format == DistanceFormat::Half) {
         sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, out.half.renew().data());
@@ -77,7 +77,7 @@ BrickContent BrickEvaluator::content(DistanceFormat format) {
         ByteCodes& codes = out.bytes.renew();
         for (size_t i = 0; i < codes.size(); ++i) codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
     }
-    if (const auto only = only_material()) {
+    if (only) {
         out.material = *only;
     } else {
         BrickMaterials made = materials();
@@ -91,19 +91,6 @@ BrickContent BrickEvaluator::content(DistanceFormat format) {
         }
     }
     return out;
-}
-
-// Where all leaves of the code that have a material have the same, so has every texel: what has none shows another's.
-std::optional<uint16_t> BrickEvaluator::only_material() const {
-    std::optional<uint16_t> out;
-    for (const sdf::Instruction in : code_) {
-        if (in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Constant) continue;
-        const uint16_t id = uint16_t(program_->params[in.param + 1]);
-        if (id == sdf::kNoMaterial) continue;
-        if (out && *out != id) return std::nullopt;
-        out = id;
-    }
-    return out.value_or(uint16_t(sdf::kDefaultMaterial));
 }
 
 BrickMaterials BrickEvaluator::materials() const {

@@ -53,11 +53,10 @@ public:
     float evaluate(std::span<const sdf::Instruction> code, ivec3 first);
     /// Of the last evaluate(), metres, not clamped.
     const std::array<float, kBrickTexelCount>& distances() const { return distances_; }
-    /// Of the last evaluate(): what is stored.
-    BrickContent content(DistanceFormat format);
+    /// Of the last evaluate(): what is stored. `only`: the material of all texels, where one knows.
+    BrickContent content(DistanceFormat format, std::optional<uint16_t> only = {}) const;
 
 private:
-    std::optional<uint16_t> only_material() const;
     BrickMaterials materials() const;
 
     const sdf::Program* program_;

@@ -70,6 +70,7 @@ public:
         KILN_PROFILE(old_ != nullptr ? "field update" : "field build");
         if (auto ok = lay_grid(); !ok) return ok.error();
         far_ = (kBandVoxels + 0.01f) * options_.voxel_size;
+        farthest_ = farthest();
         if (old_ == nullptr) {
             build_tasks({{0, 0, 0}, size_});
         } else {
@@ -242,14 +243,9 @@ private:
         balls.z[i] = middle(cell.z + first.z);
     }
 
-    float largest(const sdf::Balls& balls, int i, int size) const {
-        return std::max({std::fabs(balls.x[i]), std::fabs(balls.y[i]), std::fabs(balls.z[i])}) +
-               kHalfDiagonal * float(size) * options_.voxel_size;
-    }
-
     // One radius for all: the grid's farthest corner decides what rounding may add.
     void size_balls(sdf::Balls& balls, int size) const {
-        const float h = options_.voxel_size, rounding = 5e-7f * farthest();
+        const float h = options_.voxel_size, rounding = 5e-7f * farthest_;
         balls.radius = kHalfDiagonal * float(size) * h + rounding;
         balls.half_side = 3.5f * float(size) * h + rounding;
         balls.far = far_;
@@ -262,11 +258,10 @@ private:
         return float(cells + kTaskCells) * kBrickVoxels * options_.voxel_size;
     }
 
-    // No texel in the ball is near enough to the surface for a brick.
-    bool beyond(const sdf::ListCuller::Fold& fold, int i, int size) const {
-        const float v = std::fabs(fold.value[i]);
-        return v > fold.balls.radius + options_.own_voxels * options_.voxel_size +
-                       4e-6f * (largest(fold.balls, i, size) + v);
+    // No texel of a ball whose centre has this value is near enough to the surface for a brick.
+    bool beyond(float value, const sdf::Balls& balls) const {
+        const float v = std::fabs(value);
+        return v > balls.radius + options_.own_voxels * options_.voxel_size + 4e-6f * (farthest_ + v);
     }
 
     void build_tasks(const CellBox& all) {
@@ -309,7 +304,7 @@ private:
         for (int i = 0; i < 64; ++i) {
             if ((groups.balls.live >> i & 1u) == 0) continue;
             ++result.cells_tested;
-            if (!beyond(groups, i, kGroupCells)) {
+            if (!beyond(groups.value[i], groups.balls)) {
                 open |= uint64_t(1) << i;
                 continue;
             }
@@ -384,7 +379,7 @@ private:
         for (int i = 0; i < 64; ++i) {
             if ((cells.balls.live >> i & 1u) == 0) continue;
             ++result.cells_tested;
-            if (beyond(cells, i, 1)) {
+            if (beyond(cells.value[i], cells.balls)) {
                 set_empty(worker.cell[i], cells.value[i] < 0, task, result);
             } else {
                 open |= uint64_t(1) << i;
@@ -414,7 +409,9 @@ private:
             return;
         }
         Leaf leaf{cell, uint32_t(result.code.size()), uint32_t(worker.code.size()), true, {}};
-        if (made_ != nullptr) leaf.content = worker.evaluator.content(options_.format);
+        if (made_ != nullptr) {
+            leaf.content = worker.evaluator.content(options_.format, worker.culler.only_material(worker.cells, i));
+        }
         result.code.insert(result.code.end(), worker.code.begin(), worker.code.end());
         result.leaves.push_back(std::move(leaf));
     }
@@ -568,7 +565,8 @@ private:
     std::span<const RowChange> changes_;
     MadeBricks* made_;
     ivec3 size_;
-    float far_ = 0;
+    float far_ = 0;       // how near an edit must come to change what is stored, metres
+    float farthest_ = 0;  // largest coordinate in the grid, metres
     std::vector<CellBox> dirty_, occupancy_changes_;
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;

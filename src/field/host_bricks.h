@@ -70,7 +70,7 @@ public:
     uint64_t hash() const;
 
 private:
-    using Contents = PagedArray<BrickContent, 64>;
+    using Contents = PagedArray<BrickContent, 16>;
     void take(MadeBricks& made);
     void bake_slots(std::span<const uint32_t> slots, int workers);
     void surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, NormalKind kind, Sample& out) const;

@@ -6,7 +6,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <vector>
+#if defined(__SSE2__)
+#include <xmmintrin.h>
+#endif
 
 namespace kiln::field {
 namespace {
@@ -59,6 +63,41 @@ constexpr auto kSpread = [] {
     return out;
 }();
 
+// Where a row of cells lies in its page.
+size_t row_of(int y, int z) { return size_t((z % kCellPage * kCellPage + y % kCellPage) * kCellPage); }
+
+// The pages that a box meets, and what each has of it.
+template <typename Fn>
+void each_page(const CellMap& cells, const CellBox& box, Fn&& fn) {
+    const auto first = [](int a) { return a / kCellPage; };
+    for (int z = first(box.min.z); z * kCellPage < box.max.z; ++z) {
+        for (int y = first(box.min.y); y * kCellPage < box.max.y; ++y) {
+            for (int x = first(box.min.x); x * kCellPage < box.max.x; ++x) {
+                const ivec3 low{x * kCellPage, y * kCellPage, z * kCellPage};
+                fn(cells.page_index(x, y, z),
+                   CellBox{{std::max(low.x, box.min.x), std::max(low.y, box.min.y), std::max(low.z, box.min.z)},
+                           {std::min(low.x + kCellPage, box.max.x), std::min(low.y + kCellPage, box.max.y),
+                            std::min(low.z + kCellPage, box.max.z)}});
+            }
+        }
+    }
+}
+
+// Bit k is the highest bit of word k, of 8.
+uint32_t top_bits(const uint32_t* words) {
+    uint32_t out = 0;
+#if defined(__SSE2__)
+    for (int half = 0; half < 2; ++half) {
+        __m128 four;
+        std::memcpy(&four, words + 4 * half, sizeof four);
+        out |= uint32_t(_mm_movemask_ps(four)) << (4 * half);
+    }
+#else
+    for (int k = 0; k < kCellPage; ++k) out |= (words[k] >> 31) << k;
+#endif
+    return out;
+}
+
 }  // namespace
 
 CellBox grown(const CellBox& box, int by, ivec3 grid_size) {
@@ -80,45 +119,46 @@ void update_jumps(CellMap& cells, const CellBox& box) {
     wide.min.x &= ~(kCellPage - 1);
     const ivec3 size = wide.max - wide.min;
     BitBox occupied(size), near(size), next(size), between(size);
-    for (int z = 0; z < size.z; ++z) {
-        for (int y = 0; y < size.y; ++y) {
-            for (int x8 = 0; x8 * kCellPage < size.x; ++x8) {
-                const int cx = wide.min.x + x8 * kCellPage, cy = wide.min.y + y, cz = wide.min.z + z;
-                const auto* page = cells.words().find(cells.page_index(cx / kCellPage, cy / kCellPage, cz / kCellPage));
-                if (page == nullptr) continue;
-                const uint32_t* words = page->data() + cells.index(cx, cy, cz) % page->size();
-                uint64_t byte = 0;
-                for (int k = 0; k < kCellPage; ++k) byte |= uint64_t(words[k] >> 31) << k;
-                occupied.row(y, z)[size_t(x8) / 8] |= byte << (x8 % 8 * 8);
+    each_page(cells, wide, [&](size_t page, const CellBox& part) {
+        const CellMap::Words::Page* const words = cells.words().find(page);
+        if (words == nullptr) return;
+        const int x8 = (part.min.x - wide.min.x) / kCellPage;
+        for (int z = part.min.z; z < part.max.z; ++z) {
+            for (int y = part.min.y; y < part.max.y; ++y) {
+                occupied.row(y - wide.min.y, z - wide.min.z)[size_t(x8) / 8] |=
+                    uint64_t(top_bits(words->data() + row_of(y, z))) << (x8 % 8 * 8);
             }
         }
-    }
+    });
     // The jump's three bits, 7 until a dilation arrives.
     std::array<BitBox, 3> jump{near, near, near};
     for (BitBox& plane : jump) std::fill(plane.words.begin(), plane.words.end(), ~uint64_t(0));
     near = occupied;
     for (uint32_t k = 1; k < uint32_t(kMaxJump); ++k) {
         dilate(near, between, next);
+        uint64_t any = 0;
         for (size_t i = 0; i < next.words.size(); ++i) {
             const uint64_t arrived = next.words[i] & ~near.words[i];
+            any |= arrived;
             for (uint32_t bit = 0; bit < 3; ++bit) {
                 if ((k >> bit & 1u) == 0) jump[bit].words[i] &= ~arrived;
             }
         }
+        if (any == 0) break;
         std::swap(near, next);
     }
-    for (int z = box.min.z; z < box.max.z; ++z) {
-        for (int y = box.min.y; y < box.max.y; ++y) {
-            for (int x8 = (box.min.x - wide.min.x) / kCellPage; wide.min.x + x8 * kCellPage < box.max.x; ++x8) {
-                const int cx = wide.min.x + x8 * kCellPage, ly = y - wide.min.y, lz = z - wide.min.z;
-                const size_t page = cells.page_index(cx / kCellPage, y / kCellPage, z / kCellPage);
-                const size_t at = cells.index(cx, y, z) % CellMap::Words::kPageSize;
+    each_page(cells, box, [&](size_t page, const CellBox& part) {
+        const CellMap::Words::Page* old = cells.words().find(page);
+        const int cx = part.min.x & ~(kCellPage - 1), x8 = (cx - wide.min.x) / kCellPage;
+        for (int z = part.min.z; z < part.max.z; ++z) {
+            for (int y = part.min.y; y < part.max.y; ++y) {
                 std::array<uint32_t, kCellPage> had, wanted;
-                if (const auto* old = cells.words().find(page)) {
-                    std::copy_n(old->data() + at, had.size(), had.begin());
+                if (old != nullptr) {
+                    std::copy_n(old->data() + row_of(y, z), had.size(), had.begin());
                 } else {
                     had.fill(uint32_t(kMaxJump));
                 }
+                const int ly = y - wide.min.y, lz = z - wide.min.z;
                 const auto& low = kSpread[jump[0].byte(x8, ly, lz)];
                 const auto& middle = kSpread[jump[1].byte(x8, ly, lz)];
                 const auto& high = kSpread[jump[2].byte(x8, ly, lz)];
@@ -126,14 +166,15 @@ void update_jumps(CellMap& cells, const CellBox& box) {
                     const uint32_t empty = (had[k] & kCellInside) | low[k] | middle[k] << 1 | high[k] << 2;
                     wanted[k] = (had[k] & kCellOccupied) != 0 ? had[k] : empty;
                 }
-                for (int x = cx; x < box.min.x; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
-                for (int x = std::max(box.max.x, cx); x < cx + kCellPage; ++x)
-                    wanted[size_t(x - cx)] = had[size_t(x - cx)];
-                if (wanted != had)
-                    std::copy(wanted.begin(), wanted.end(), cells.words().write_page(page).begin() + ptrdiff_t(at));
+                for (int x = cx; x < part.min.x; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
+                for (int x = part.max.x; x < cx + kCellPage; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
+                if (wanted == had) continue;
+                CellMap::Words::Page& mine = cells.words().write_page(page);
+                std::copy(wanted.begin(), wanted.end(), mine.begin() + ptrdiff_t(row_of(y, z)));
+                old = &mine;
             }
         }
-    }
+    });
 }
 
 }  // namespace kiln::field

@@ -117,6 +117,7 @@ public:
         params_first_ = uint32_t(out_.params.size());
         params_.clear();
         code_.clear();
+        material_ = uint16_t(kNoMaterial);
         if (!edit.hidden) {
             const float k = edit.blend_radius;
             const float k_material = edit.material_blend_radius < 0 ? k : edit.material_blend_radius;
@@ -128,6 +129,7 @@ public:
             const uint32_t at = add_params({k, k_material});
             const uint32_t flag = nodes_[0].lacks_material ? kMayLackMaterial : 0u;
             code_.push_back(Instruction::make(Opcode::Combine, uint32_t(edit.op) | flag, 0, 0, 1, at));
+            span.material = material_;
             span.bounds = resolved_.edit_bounds[e].parent;
             span.blend = k;
             span.rate = resolved_.edit_bounds[e].rate;
@@ -364,6 +366,10 @@ private:
         leaf.chain = flush(task.chain, task.pending);
         leaf.param = add_params({float(task.scale), float(task.material), float(row_)}, params);
         leaf.lacks_material = task.material == kNoMaterial;
+        if (!leaf.lacks_material) {
+            const bool first = material_ == kNoMaterial;
+            material_ = first || material_ == task.material ? uint16_t(task.material) : kSeveralMaterials;
+        }
         add_node(task, leaf);
     }
 
@@ -434,7 +440,8 @@ private:
     const Resolved& resolved_;
     Program& out_;
     uint32_t edit_ = 0, row_ = 0;
-    uint32_t params_first_ = 0;  // where params_ will lie in the program
+    uint16_t material_ = uint16_t(kNoMaterial);  // of the edit's leaves so far
+    uint32_t params_first_ = 0;                  // where params_ will lie in the program
     std::vector<float> params_;
     std::vector<Instruction> code_;
     std::vector<Binary> nodes_;

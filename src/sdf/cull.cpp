@@ -4,6 +4,7 @@
 #include "base/assert.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -14,6 +15,18 @@ constexpr float kInfinite = std::numeric_limits<float>::infinity();
 
 bool is_tree(std::span<const Instruction> code) {
     return std::any_of(code.begin(), code.end(), [](Instruction in) { return in.opcode() >= Opcode::Combine; });
+}
+
+// 64 x 64 bits: bit j of row i becomes bit i of row j (Warren, "Hacker's Delight", 2nd ed. 2012, 7-3).
+void transpose(uint64_t* rows) {
+    uint64_t mask = 0xffffffffull;
+    for (size_t step = 32; step != 0; step /= 2, mask ^= mask << step) {
+        for (size_t i = 0; i < 64; i = (i + step + 1) & ~step) {
+            const uint64_t swap = ((rows[i] >> step) ^ rows[i + step]) & mask;
+            rows[i] ^= swap << step;
+            rows[i + step] ^= swap;
+        }
+    }
 }
 
 }  // namespace
@@ -94,6 +107,27 @@ void ListCuller::keep(Fold& fold, uint64_t live) {
         if (won != 0 && join_of(entry, true) == FoldEntry::Take) material |= won;
     }
     fold.from_empty = fold.list.from_empty ? value | material : 0;
+    fold.kept.resize((n + 63) / 64 * 64);
+    for (size_t block = 0; block * 64 < n; ++block) {
+        uint64_t* const rows = fold.kept.data() + block * 64;
+        for (size_t i = 0; i < 64; ++i) {
+            const size_t e = block * 64 + i;
+            rows[i] = e < n ? fold.joined[e] | fold.won[e] | fold.shown[e] : 0;
+        }
+        transpose(rows);
+    }
+}
+
+template <typename Fn>
+void ListCuller::each_kept(const Fold& fold, int ball, Fn&& fn) {
+    const uint64_t bit = uint64_t(1) << ball;
+    for (size_t first = 0; first < fold.list.count; first += 64) {
+        for (uint64_t left = fold.kept[first + size_t(ball)]; left != 0; left &= left - 1) {
+            const size_t i = first + size_t(std::countr_zero(left));
+            const bool shown = (fold.shown[i] & bit) != 0;
+            fn(i, shown || (fold.won[i] & bit) != 0, shown);
+        }
+    }
 }
 
 // What becomes of an edit's Combine in a ball where the edit alone wins.
@@ -148,9 +182,7 @@ void ListCuller::write_join(const Entry& entry, FoldEntry::Join join, std::vecto
 ListCuller::List ListCuller::child(const Fold& fold, int ball) {
     const uint64_t bit = uint64_t(1) << ball;
     List out{entries_.size(), 0, code_.size(), (fold.from_empty & bit) != 0};
-    for (size_t i = 0; i < fold.list.count; ++i) {
-        const bool shown = (fold.shown[i] & bit) != 0, won = shown || (fold.won[i] & bit) != 0;
-        if (!won && (fold.joined[i] & bit) == 0) continue;
+    each_kept(fold, ball, [&](size_t i, bool won, bool shown) {
         Entry entry = entries_[fold.list.first + i];
         if (entry.tree || shown) {
             const uint32_t at = uint32_t(code_.size());
@@ -162,7 +194,7 @@ ListCuller::List ListCuller::child(const Fold& fold, int ball) {
         }
         entry.join = join_of(entry, won);
         entries_.push_back(entry);
-    }
+    });
     out.count = entries_.size() - out.first;
     return out;
 }
@@ -171,13 +203,22 @@ void ListCuller::emit(const Fold& fold, int ball, std::vector<Instruction>& out)
     const uint64_t bit = uint64_t(1) << ball;
     out.clear();
     if ((fold.from_empty & bit) != 0) out.push_back(Instruction::make(Opcode::Empty, 0, 0, 0, 0, 0));
-    for (size_t i = 0; i < fold.list.count; ++i) {
-        const bool shown = (fold.shown[i] & bit) != 0, won = shown || (fold.won[i] & bit) != 0;
-        if (!won && (fold.joined[i] & bit) == 0) continue;
+    each_kept(fold, ball, [&](size_t i, bool won, bool shown) {
         const Entry& entry = entries_[fold.list.first + i];
         write_content(entry, fold.balls.center(ball), fold.balls.radius, !shown, out);
         write_join(entry, join_of(entry, won), out);
-    }
+    });
+}
+
+std::optional<uint16_t> ListCuller::only_material(const Fold& fold, int ball) const {
+    uint16_t out = uint16_t(kNoMaterial);
+    each_kept(fold, ball, [&](size_t i, bool, bool) {
+        const uint16_t material = program_->edits[entries_[fold.list.first + i].row].material;
+        if (material == kNoMaterial || material == out) return;  // what has none shows another's
+        out = out == kNoMaterial ? material : kSeveralMaterials;
+    });
+    if (out == kSeveralMaterials) return std::nullopt;
+    return out == kNoMaterial ? uint16_t(kDefaultMaterial) : out;
 }
 
 void ListCuller::drop(const List& list) {

@@ -9,6 +9,7 @@
 #include "sdf/prune.h"
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -30,9 +31,10 @@ public:
         Balls balls;
         alignas(64) float value[64];        ///< at the centres, metres
         std::vector<uint64_t> left, right;  ///< by entry: who wins
-        std::vector<uint64_t> joined, won,
-            shown;  ///< by entry: kept as it is; kept and what was before it dropped; for its material only
-        uint64_t from_empty = 0;  ///< needs the empty space before the first entry
+        std::vector<uint64_t> kept;         ///< by ball, 64 entries a word: what it keeps
+        std::vector<uint64_t> joined;       ///< by entry: kept with what was before it
+        std::vector<uint64_t> won, shown;   ///< kept without; likewise, but for its material only
+        uint64_t from_empty = 0;            ///< needs the empty space before the first entry
     };
 
     /// The list of these rows, which are in order.
@@ -44,6 +46,8 @@ public:
     /// Then, for one ball: its list, or its code (replacing `out`).
     List child(const Fold& fold, int ball);
     void emit(const Fold& fold, int ball, std::vector<Instruction>& out);
+    /// The one material of everything in the ball, where its edits have but one.
+    std::optional<uint16_t> only_material(const Fold& fold, int ball) const;
     /// Drops `list` and all lists made after it.
     void drop(const List& list);
 
@@ -60,6 +64,9 @@ private:
     };
     static TapeView numbers_of(const Program& program) { return {{}, program.params.data(), program.samples.data()}; }
     std::span<const Instruction> code_of(const Entry& entry) const;
+    /// fn(entry number, won, shown) for everything that a ball keeps, in order.
+    template <typename Fn>
+    static void each_kept(const Fold& fold, int ball, Fn&& fn);
     FoldEntry::Join join_of(const Entry& entry, bool won) const;
     void write_content(const Entry& entry, vec3 center, float radius, bool whole, std::vector<Instruction>& out);
     void write_join(const Entry& entry, FoldEntry::Join join, std::vector<Instruction>& out) const;

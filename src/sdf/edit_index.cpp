@@ -147,8 +147,8 @@ void EditIndex::remove(const IndexedEdit& edit) {
     if (root_->count == 0) root_ = {};
 }
 
-template <typename Fn>
-void EditIndex::each(const Box3& box, float value, float per_reach, Fn&& fn) const {
+template <typename Enter, typename Fn>
+void EditIndex::each(const Box3& box, float value, float per_reach, Enter&& enter, Fn&& fn) const {
     if (everywhere_) {
         for (const IndexedEdit& e : *everywhere_) fn(e);
     }
@@ -158,7 +158,8 @@ void EditIndex::each(const Box3& box, float value, float per_reach, Fn&& fn) con
     stack[depth++] = root_.get();
     while (depth > 0) {
         const Node& node = *stack[--depth];
-        if (!node.box.inflated((value + per_reach * node.reach) * node.slowness).overlaps(box)) continue;
+        if (!enter(node) || !node.box.inflated((value + per_reach * node.reach) * node.slowness).overlaps(box))
+            continue;
         for (const IndexedEdit& e : node.edits) {
             if (e.influence(value + per_reach * e.reach).overlaps(box)) fn(e);
         }
@@ -169,7 +170,8 @@ void EditIndex::each(const Box3& box, float value, float per_reach, Fn&& fn) con
 }
 
 void EditIndex::find(const Box3& box, float value, float per_reach, std::vector<uint32_t>& rows) const {
-    each(box, value, per_reach, [&](const IndexedEdit& e) { rows.push_back(e.row); });
+    each(
+        box, value, per_reach, [](const Node&) { return true; }, [&](const IndexedEdit& e) { rows.push_back(e.row); });
 }
 
 // A world is a left fold. With T the value above which a result need not be known, an operand of a smooth operation with radius k must
@@ -179,9 +181,11 @@ void EditIndex::find(const Box3& box, float value, float per_reach, std::vector<
 // radii are always enough (1e-7 of k).
 float EditIndex::blend_allowance(const Box3& box, float value, uint32_t without) const {
     BlendAllowance out;
-    each(box, value, BlendAllowance::kLadder, [&](const IndexedEdit& e) {
-        if (e.row != without) out.add(e.reach);
-    });
+    each(
+        box, value, BlendAllowance::kLadder, [](const Node& node) { return node.reach > 0; },
+        [&](const IndexedEdit& e) {
+            if (e.row != without) out.add(e.reach);
+        });
     return out.metres();
 }
 

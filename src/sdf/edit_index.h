@@ -68,8 +68,8 @@ public:
 
 private:
     void find(const Box3& box, float value, float per_reach, std::vector<uint32_t>& rows) const;
-    template <typename Fn>
-    void each(const Box3& box, float value, float per_reach, Fn&& fn) const;
+    template <typename Enter, typename Fn>
+    void each(const Box3& box, float value, float per_reach, Enter&& enter, Fn&& fn) const;
 
     struct Node {
         Shared<Node> child[8];  ///< x, y, z above the middle: bits 0, 1, 2

@@ -189,9 +189,11 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
 
     BrickValues values;
     size_t pc = 0;
-    if (count > 0 && Opcode(code[0] & 15u) == Opcode::Empty && ((code[0] >> 12) & 31u) == 0u) pc = 1;
-    for (int slice = 0; slice < kBrickSlices; ++slice) {
-        for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = real(param(kEmpty));
+    if (count > 0 && Opcode(code[0] & 15u) == Opcode::Empty && ((code[0] >> 12) & 31u) == 0u) {
+        pc = 1;
+        for (int slice = 0; slice < kBrickSlices; ++slice) {
+            for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = real(param(kEmpty));
+        }
     }
     Registers r;
     while (pc < count) {

@@ -27,10 +27,11 @@ inline constexpr int kRegisters = 24;
 /// Distance of empty space: finite, so that no operation on it makes a NaN. Anything >= kEmptyTest means "nothing there".
 inline constexpr float kEmpty = 1e30f;
 inline constexpr float kEmptyTest = 1e29f;
-/// "No material": a subtract or intersect operand that leaves what was there. Others are 0 … 65534.
+/// "No material": a subtract or intersect operand that leaves what was there. Others are 0 … 65533.
 inline constexpr uint32_t kNoMaterial = 65535;
 /// Material numbers in tapes and bricks: 0 is the default grey, MaterialId::index + 1 the rest.
 inline constexpr uint32_t kDefaultMaterial = 0;
+inline constexpr uint16_t kSeveralMaterials = 65534;  ///< of an edit: its leaves are of more than one
 inline constexpr uint32_t material_number(MaterialId id) { return id ? id.index + 1 : kDefaultMaterial; }
 
 // Instruction word: opcode 0-3, aux 4-11, dst 12-16, a 17-21, b 22-26. `param` indexes Program::params.
@@ -83,8 +84,9 @@ struct EditSpan {
         0;  ///< max(blend radius, material blend radius): it can change values within band + reach of its solid
     float rate = 1;  ///< outside `bounds` its value is at least this times the distance to them
     Op op = Op::Union;
-    uint32_t owner = 0;  ///< the caller's number of the edit
-    uint64_t order = 0;  ///< its place in the list: the world folds by ascending order
+    uint16_t material = uint16_t(kNoMaterial);  ///< of all its leaves that have one; kSeveralMaterials
+    uint32_t owner = 0;                         ///< the caller's number of the edit
+    uint64_t order = 0;                         ///< its place in the list: the world folds by ascending order
 
     bool everywhere() const { return op == Op::Intersect || !bounds.finite(); }
     IndexedEdit indexed(uint32_t row) const {

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: MIT
-// The three containers that snapshots are made of: what one holder changes, another never sees.
+// What snapshots are made of: what one holder changes, another never sees.
 
 #include "base/append_array.h"
+#include "base/block_pool.h"
 #include "base/paged_array.h"
 #include "base/shared.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <numeric>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace kiln {
@@ -44,6 +48,32 @@ TEST(Shared, HoldersOnOtherThreadsKeepTheirValue) {
     }
     for (int i = 0; i < 100; ++i) value.write()[size_t(i)] = i;
     for (std::thread& t : readers) t.join();
+}
+
+TEST(BlockPool, BlocksOfEverySizeAreApartAndWholeOnEveryThread) {
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t) {
+        threads.emplace_back([t] {
+            std::vector<std::pair<unsigned char*, size_t>> held;
+            for (size_t round = 0; round < 3; ++round) {
+                for (size_t i = 0; i < 1500; ++i) {
+                    const size_t bytes = 1 + (i * 37 + size_t(t)) % 5000;
+                    auto* const block = static_cast<unsigned char*>(take_block(bytes));
+                    ASSERT_EQ(reinterpret_cast<uintptr_t>(block) % kBlockAlign, 0u);
+                    std::fill_n(block, bytes, static_cast<unsigned char>(i + size_t(t)));
+                    held.emplace_back(block, bytes);
+                }
+                for (size_t i = 0; i < held.size(); ++i) {
+                    const auto [block, bytes] = held[i];
+                    ASSERT_EQ(block[0], static_cast<unsigned char>(i + size_t(t)));
+                    ASSERT_EQ(block[bytes - 1], static_cast<unsigned char>(i + size_t(t)));
+                    give_block(block, bytes);
+                }
+                held.clear();
+            }
+        });
+    }
+    for (std::thread& t : threads) t.join();
 }
 
 TEST(AppendArray, ACopyKeepsItsLengthWhileTheNewestGrowsInPlace) {

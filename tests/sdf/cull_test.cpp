@@ -115,8 +115,10 @@ TEST(EvaluateBrick, HasTheBitsOfPointsOnEveryInstructionSet) {
             for (Edit& e : s.edits) {
                 e.node.kind = Node::Kind::Shape;
                 e.node.domain.clear();
-                if (r.below(2) == 0) e.node.shape = Sphere{.radius = r.in(0.2f, 1)};
-                else e.node.shape = Box{.half_extents = {r.in(0.2f, 1), r.in(0.2f, 1), r.in(0.2f, 1)}};
+                if (r.below(2) == 0)
+                    e.node.shape = Sphere{.radius = r.in(0.2f, 1)};
+                else
+                    e.node.shape = Box{.half_extents = {r.in(0.2f, 1), r.in(0.2f, 1), r.in(0.2f, 1)}};
                 e.node.transform.rotation = {};
                 e.node.transform.scale = vec3{1, 1, 1} * r.in(0.5f, 2);
                 e.node.transform.position = r.below(5) == 0 ? vec3{} : r.point(1);
@@ -145,7 +147,8 @@ TEST(EvaluateBrick, HasTheBitsOfPointsOnEveryInstructionSet) {
             for (const Isa isa : {Isa::Scalar, Isa::Sse4, Isa::Avx2, Isa::Avx512}) {
                 if (!has_isa(isa)) continue;
                 EXPECT_EQ(evaluate_brick(tape, x, y, z, got.data(), isa), least) << "seed " << seed;
-                for (size_t i = 0; i < 512; ++i) ASSERT_EQ(got[i], expected[i]) << "seed " << seed << " isa " << int(isa);
+                for (size_t i = 0; i < 512; ++i)
+                    ASSERT_EQ(got[i], expected[i]) << "seed " << seed << " isa " << int(isa);
             }
         }
     }
