@@ -8,6 +8,7 @@
 #include <kiln/result.h>
 
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -18,6 +19,9 @@ namespace kiln {
 
 namespace field {
 class Field;
+}
+namespace render::shade {
+struct EnvironmentMap;
 }
 
 enum class ToneMap : uint8_t { None, Exponential, Aces, Neutral };
@@ -47,8 +51,9 @@ struct Light {
 };
 
 struct Environment {
-    vec3 color{0.5f, 0.6f, 0.8f};  ///< radiance of a constant sky
-    float intensity = 1;
+    vec3 color{0.5f, 0.6f, 0.8f};  ///< radiance of a constant sky; not used where there is an image
+    float intensity = 1;           ///< multiplies it
+    std::string file{};  ///< equirectangular OpenEXR image, its middle towards -Z; relative to the scene's file
 };
 
 enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks };
@@ -58,7 +63,8 @@ struct Frame {
     std::shared_ptr<const field::Field> field;  ///< immutable snapshot
     std::vector<Material> materials;            ///< indexed by the field's material numbers
     std::vector<Light> lights;
-    Environment environment;
+    std::optional<Environment> environment;  ///< none: a clear sky, with the disc of the first directional light
+    std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
     int coarsened = 0;  ///< times the voxel size was doubled to fit the pool
 };

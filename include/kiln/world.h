@@ -53,8 +53,8 @@ public:
     std::vector<EditId> edits() const;  ///< in order
 
     FieldSettings field_settings;
-    std::vector<Light> lights;  ///< none: a default sun and sky
-    std::optional<Environment> environment;
+    std::vector<Light> lights;                            ///< none: a default sun, unless an image lights the scene
+    std::optional<Environment> environment;               ///< none: a default sky
     std::vector<std::pair<std::string, Camera>> cameras;  ///< none: framed automatically
 
     /// Exact distance of the ordered program, metres; +infinity in an empty world.

@@ -60,7 +60,7 @@ private:
     size_t at_ = 0;
 };
 
-FloatPixels decode(std::span<const std::byte> bytes, const std::string& name) {
+FloatPixels decode(std::span<const std::byte> bytes, const std::string& name, int64_t most_pixels) {
     MemoryInput stream(bytes, name.c_str());
     Imf::InputFile file(stream, 1);
     const Imf::Header& header = file.header();
@@ -71,6 +71,8 @@ FloatPixels decode(std::span<const std::byte> bytes, const std::string& name) {
     // No compression of the format makes more than some thousand bytes of one.
     if (double(width) * double(height) > 4096.0 * double(bytes.size()))
         throw std::runtime_error("more pixels than the file can hold");
+    if (width * height > most_pixels)
+        throw std::runtime_error(formatted("{} x {} pixels; at most {} are read", width, height, most_pixels));
 
     const Imf::ChannelList& channels = header.channels();
     std::vector<const char*> names;
@@ -120,22 +122,22 @@ Result<void> save(const std::string& path, const Imf::Header& header, const Imf:
 
 }  // namespace
 
-Result<FloatPixels> decode_exr(std::span<const std::byte> bytes, const std::string& name) {
+Result<FloatPixels> decode_exr(std::span<const std::byte> bytes, const std::string& name, int64_t most_pixels) {
     const unsigned char magic[] = {0x76, 0x2f, 0x31, 0x01};
     if (bytes.size() < 4 || std::memcmp(bytes.data(), magic, 4) != 0)
         return Error{formatted("{}: not an OpenEXR file", name), ErrorKind::Input};
     try {
-        return decode(bytes, name);
+        return decode(bytes, name, most_pixels);
     } catch (const std::exception& e) {
         // The library begins its messages with its own words for the file.
         return Error{formatted("{}: broken OpenEXR: {}", name, e.what()), ErrorKind::Input};
     }
 }
 
-Result<FloatPixels> read_exr(const std::string& path) {
+Result<FloatPixels> read_exr(const std::string& path, int64_t most_pixels) {
     Result<std::vector<std::byte>> bytes = read_bytes(path);
     if (!bytes) return bytes.error();
-    return decode_exr(*bytes, path);
+    return decode_exr(*bytes, path, most_pixels);
 }
 
 Result<void> write_exr(const std::string& path, int width, int height, int channels, std::span<const float> values) {

@@ -38,6 +38,7 @@ inline float cos(float a) { return std::cos(a); }
 inline float asin(float a) { return std::asin(a); }
 inline float acos(float a) { return std::acos(a); }
 inline float tan(float a) { return std::tan(a); }
+inline float atan(float y, float x) { return std::atan2(y, x); }
 inline uint floatBitsToUint(float a) { return std::bit_cast<uint>(a); }
 inline float uintBitsToFloat(uint a) { return std::bit_cast<float>(a); }
 

@@ -116,7 +116,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         return out;
     }
     out.push_back(&shadow_kernel(in));
-    out.push_back(&kLight);
+    out.push_back(&light_kernel(in));
     out.push_back(&kTonemap);
     return out;
 }

@@ -80,6 +80,22 @@ struct Scene {
         return size > 0 ? dvec3{g.x / size, g.y / size, g.z / size} : dvec3{0, 1, 0};
     }
 
+    vec3 tint() const { return {sky.c0.x, sky.c0.y, sky.c0.z}; }
+    // What a ray that hits nothing sees.
+    vec3 radiance(dvec3 direction, bool with_sun) const {
+        const vec3 d = narrow(direction);
+        if (settings.environment)
+            return tint() * shade::EnvironmentLight{settings.environment->words}.environment_radiance(d);
+        return shade::sky_radiance(with_sun ? sky : sky_no_sun, d);
+    }
+    // Light from all around, unoccluded.
+    vec3 around(const SurfaceView& s) const {
+        if (!settings.environment) return shade::shade_sky(s, sky_no_sun);
+        shade::EnvironmentLight light{settings.environment->words};
+        return tint() * shade::shade_around(s, light.environment_ambient(s.n),
+                                            light.environment_reflection(shade::reflected_view(s), s.optics.roughness));
+    }
+
     bool reaches(dvec3 p, dvec3 direction, double distance) const {
         return reference_hit(field, p, direction, distance) < 0;
     }
@@ -141,7 +157,7 @@ double disc_distance(const LightSample& light, const Scene& scene) {
 // samples = 0: as the lighting pass does it, with the visible fraction counted by rays.
 vec3 direct(const Scene& scene, const Hit& hit, dvec3 direction, Random& random) {
     const SurfaceView s = view_of(scene, hit, direction);
-    vec3 sum = shade::shade_sky(s, scene.sky_no_sun) + hit.material.emissive;
+    vec3 sum = scene.around(s) + hit.material.emissive;
     for (const LightRecord& record : scene.lights) {
         const LightSample light = shade::sample_light(record, narrow(hit.p));
         if (dot(hit.n, light.l) <= 0 || largest3(light.illuminance) <= 0) continue;
@@ -203,8 +219,7 @@ vec3 path(const Scene& scene, dvec3 origin, dvec3 direction, Random& random, boo
     for (int depth = 0;; ++depth) {
         const double t = reference_hit(scene.field, origin, direction, scene.settings.farthest);
         if (depth == 0) seen = t >= 0;
-        if (t < 0)
-            return sum + carried * shade::sky_radiance(depth == 0 ? scene.sky : scene.sky_no_sun, narrow(direction));
+        if (t < 0) return sum + carried * scene.radiance(direction, depth == 0);
         const Hit hit = hit_at(scene, origin, direction, t);
         sum = sum + carried * hit.material.emissive;
         const SurfaceView s = view_of(scene, hit, direction);
@@ -294,7 +309,7 @@ ReferencePicture render_reference(const ReferenceField& field, std::span<const L
             if (settings.samples == 0) sum = direct(scene, hit, middle, middle_random);
             covered = 1;
         } else if (settings.samples == 0) {
-            sum = shade::sky_radiance(scene.sky, narrow(middle));
+            sum = scene.radiance(middle, true);
         }
         if (settings.samples > 0) {
             double mean = 0, squares = 0;  // Welford

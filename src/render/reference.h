@@ -7,6 +7,7 @@
 // Results are the same bytes for any number of workers: every pixel has its own random sequence.
 #pragma once
 
+#include "render/lib/environment_map.h"
 #include "render/lib/sky.gpu.h"
 
 #include <kiln/edit.h>
@@ -36,8 +37,9 @@ struct ReferenceSettings {
     int most_bounces = 16;     // 0: light that comes straight from the lights, and emission
     bool lambert = false;      // surfaces without reflection: for closed forms
     uint32_t seed = 1;
-    int workers = 0;        // 0: every core
-    double farthest = 1e5;  // metres: what lies beyond is not seen
+    int workers = 0;                                     // 0: every core
+    const shade::EnvironmentMap* environment = nullptr;  // an image all around, multiplied by the constant sky
+    double farthest = 1e5;                               // metres: what lies beyond is not seen
 };
 
 struct ReferencePicture {

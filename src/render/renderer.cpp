@@ -7,6 +7,7 @@
 #include "field/field.h"
 #include "render/frame.h"
 #include "render/graph_runner.h"
+#include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
 #include "render/picture.h"
@@ -34,24 +35,30 @@ struct Renderer::Impl {
     std::unique_ptr<GpuField> field;
     std::string fault;  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
+    rhi::BufferHandle environment;
+    std::shared_ptr<const shade::EnvironmentMap> environment_map;  // what is in the buffer
     RenderStats stats;
 
     ~Impl() {
         field.reset();
-        if (runner && ggx_table) {
-            runner->forget(ggx_table);
-            device->destroy(ggx_table);
+        for (const rhi::BufferHandle buffer : {ggx_table, environment}) {
+            if (!runner || !buffer) continue;
+            runner->forget(buffer);
+            device->destroy(buffer);
         }
         runner.reset();
     }
 
     Result<void> prepare();
+    // Brings a frame's environment image to the device.
+    Result<void> bring(const Frame& frame);
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                              Picture& picture);
     // The switches of a frame; its resources are still to come.
-    TileInputs inputs(const RenderSettings& settings) const {
+    TileInputs inputs(const Frame& frame, const RenderSettings& settings) const {
         TileInputs in;
+        in.image_sky = frame.environment && frame.environment_map;
         in.analytic = settings.analytic;
         in.exact = settings.analytic || field->leaves_grid();
         in.horizons = !settings.analytic && field->outside_is_concave();
@@ -82,6 +89,23 @@ Result<void> Renderer::Impl::prepare() {
     return healthy();
 }
 
+Result<void> Renderer::Impl::bring(const Frame& frame) {
+    if (!frame.environment || !frame.environment_map || frame.environment_map == environment_map) return {};
+    environment_map = nullptr;
+    if (environment) {
+        runner->forget(environment);
+        device->destroy(environment);
+        environment = {};
+    }
+    const std::span<const uint32_t> words = frame.environment_map->words;
+    auto buffer = device->create_buffer({.size = words.size_bytes(), .label = "environment"});
+    if (!buffer) return buffer.error();
+    environment = *buffer;
+    if (auto written = device->write_buffer(environment, 0, std::as_bytes(words)); !written) return written;
+    environment_map = frame.environment_map;
+    return {};
+}
+
 void Renderer::Impl::add_times(const FrameTimes& times) {
     stats.frame_ms += times.total_ms;
     for (const PassTime& pass : times.passes) {
@@ -99,7 +123,7 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                                          Picture& picture) {
     Graph g(*runner);
-    TileInputs in = inputs(settings);
+    TileInputs in = inputs(frame, settings);
     in.field = field->import(g);
     in.frame = g.block(params);
     const FrameRay no_ray{};
@@ -112,6 +136,9 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     if (lights.empty()) lights.emplace_back();
     in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
     in.ggx_table = g.import("ggx albedo", ggx_table);
+    const uint32_t nothing[4] = {};
+    in.environment = in.image_sky ? g.import("environment", environment)
+                                  : g.upload("no environment", std::span<const uint32_t>(nothing));
     in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
 
     const TileResult tile = record_tile(g, in, settings.view);
@@ -145,12 +172,13 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.device = device->info().name;
     if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated)
         return updated.error();
-    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(settings), settings.view)); !warm)
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
         return warm.error();
 
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
-    params->sky = shade::sky_params(frame.environment);
+    params->sky = shade::sky_params(frame);
+    if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
         stats.passes.emplace_back("bake", field->bake_ms());

@@ -134,7 +134,7 @@ constexpr KeyRow kLightRows[] = {
 };
 constexpr KeyRow kEnvironmentRows[] = {
     numbers("color", 3, KILN_AT(Environment, color), {0.5f, 0.6f, 0.8f}, "cd/m²", ">= 0", "radiance of a constant sky"),
-    plain("file", KeyType::Text, "equirectangular image, its centre towards -Z"),
+    plain("file", KeyType::Text, "equirectangular OpenEXR image instead of the colour, its centre towards -Z"),
     number("intensity", KILN_AT(Environment, intensity), 1, "1", ">= 0", "multiplies it"),
 };
 constexpr KeyRow kCameraRows[] = {
@@ -207,8 +207,9 @@ constexpr KeyRow kSceneRows[] = {
     inside("objects", KeyType::Map, kNodeTable, "reusable trees by name; drawn only where an edit places them"),
     inside("edits", KeyType::List, kEditTable, "the world: each acts on all before it"),
     inside("meshes", KeyType::List, kMeshTable, "triangle meshes"),
-    inside("lights", KeyType::List, kLightTable, "left out: a sun"),
-    inside("environment", KeyType::Object, kEnvironmentTable, "the sky"),
+    inside("lights", KeyType::List, kLightTable, "left out: a sun, unless an image of the sky has its own"),
+    inside("environment", KeyType::Object, kEnvironmentTable,
+           "the sky; left out: a clear one, with the disc of the first sun"),
     inside("cameras", KeyType::Map, kCameraTable, "by name, the first is the default; left out: the scene is framed"),
     inside("physics", KeyType::Object, kPhysicsTable, "of the whole world"),
     inside("bodies", KeyType::List, kBodyTable, "rigid bodies"),

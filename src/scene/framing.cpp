@@ -17,6 +17,4 @@ Camera framing_camera(const Box3& box) {
     return camera;
 }
 
-Light default_sun() { return Light{}; }
-
 }  // namespace kiln::scene

@@ -57,8 +57,11 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
             field.bounds.inflated(program.index.largest_reach());  // smooth unions bulge beyond their operands
     }
     const render::ReferencePicture traced =
-        render::render_reference(field, frame.lights, render::shade::sky_params(frame.environment), frame.camera,
-                                 {.width = settings.width, .height = settings.height, .samples = samples});
+        render::render_reference(field, frame.lights, render::shade::sky_params(frame), frame.camera,
+                                 {.width = settings.width,
+                                  .height = settings.height,
+                                  .samples = samples,
+                                  .environment = frame.environment ? frame.environment_map.get() : nullptr});
     Picture out;
     out.width = traced.width;
     out.height = traced.height;

@@ -111,8 +111,12 @@ private:
         if (!at) return true;
         Environment e;
         if (!in_.table(*at, kEnvironmentTable, &e.color.x)) return false;
+        if (const auto file = doc_.find(*at, "file")) {
+            e.file = doc_.text(*file);
+            if (e.file.empty())
+                return in_.fail(*file, "an empty file name; name an OpenEXR image, or leave the key out");
+        }
         scene_.stage.environment = e;
-        if (doc_.find(*at, "file")) scene_.undrawn.push_back("environment.file");
         return true;
     }
 

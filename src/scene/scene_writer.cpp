@@ -186,7 +186,7 @@ private:
         out_.open(JsonType::Object, "environment");
         for (const auto& [k, w] : members(at, kEnvironmentTable)) {
             if (k == "file") {
-                keep(k, w);
+                if (!stage_.environment->file.empty()) out_.add_text(stage_.environment->file, k);
             } else {
                 number_row(*find_row(kEnvironmentTable, k), w, &stage_.environment->color.x);
             }

@@ -85,6 +85,8 @@ Result<World> World::parse(std::string_view json, const std::string& file_name) 
     impl.number_all();
     // Compiled now, so that faults which only the whole scene shows come with their place.
     if (auto compiled = impl.compile_all(); !compiled) return compiled.error();
+    if (world.environment && !world.environment->file.empty())
+        if (auto read = impl.read_sky(world.environment->file); !read) return read.error();
     return world;
 }
 

@@ -6,6 +6,7 @@
 #include "scene/suggest.h"
 #include "scene/world_impl.h"
 
+#include "render/lib/pack.h"
 #include "sdf/tables.h"
 
 #include "base/format.h"
@@ -152,6 +153,21 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     return next;
 }
 
+// Called under the mutex, or before anyone else has the world.
+Result<void> World::Impl::read_sky(const std::string& file) {
+    if (sky_image.file == file) return {};
+    auto pixels = scene::load_sky_image(file.starts_with('/') ? file : data.folder + file);
+    if (!pixels) {
+        const scene::JsonDocument& doc = data.source;
+        if (const auto section = doc.empty() ? std::nullopt : doc.find(0, "environment"))
+            if (const auto at = doc.find(*section, "file"); at && doc.text(*at) == file)
+                return doc.error(*at, pixels.error().message);
+        return Error{"environment.file: " + pixels.error().message, ErrorKind::Input};
+    }
+    sky_image = {file, std::make_shared<const image::FloatPixels>(std::move(*pixels)), nullptr};
+    return {};
+}
+
 float World::distance(vec3 p) const {
     return float(scene::ExactField(*impl_->compiled()).distance({double(p.x), double(p.y), double(p.z)}));
 }
@@ -188,8 +204,21 @@ Result<Frame> World::frame(std::string_view camera) const {
     out.materials.emplace_back();  // sdf::kDefaultMaterial
     for (const auto& [name, material] : impl_->data.materials) out.materials.push_back(material);
     out.lights = lights;
-    if (out.lights.empty()) out.lights.push_back(scene::default_sun());
-    out.environment = environment.value_or(Environment{});
+    out.environment = environment;
+    const bool image = environment && !environment->file.empty();
+    if (image) {
+        const std::lock_guard lock(impl_->mutex);
+        if (auto read = impl_->read_sky(environment->file); !read) return read.error();
+        Impl::SkyImage& sky = impl_->sky_image;
+        if (!sky.map) {
+            sky.map =
+                std::make_shared<const render::shade::EnvironmentMap>(render::shade::make_environment_map(*sky.pixels));
+            sky.pixels = nullptr;
+        }
+        out.environment_map = sky.map;
+    }
+    // An image of a sky has its own sun.
+    if (out.lights.empty() && !image) out.lights.push_back(render::shade::default_sun());
     if (camera.empty()) {
         out.camera = cameras.empty() ? scene::framing_camera(built->field->program().bounds) : cameras.front().second;
         return out;

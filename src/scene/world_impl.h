@@ -4,9 +4,11 @@
 
 #include "scene/heights.h"
 #include "scene/scene_file.h"
+#include "scene/sky_image.h"
 
 #include "field/field.h"
 #include "field/host_bricks.h"
+#include "render/lib/environment_map.h"
 
 #include <kiln/world.h>
 
@@ -67,6 +69,15 @@ struct World::Impl {
     std::vector<field::RowChange> changes;            ///< since `built`
     std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
     scene::Grids grids;
+
+    /// The image of the environment: read when its name is first met, brought into shape when it is first drawn.
+    struct SkyImage {
+        std::string file;
+        std::shared_ptr<const image::FloatPixels> pixels;  ///< until there is a map
+        std::shared_ptr<const render::shade::EnvironmentMap> map;
+    };
+    SkyImage sky_image;
+    Result<void> read_sky(const std::string& file);
 
     /// Compiles the whole list.
     Result<void> compile_all();

@@ -86,7 +86,7 @@ TEST(Sky, MeetsItsThreeColorsAndAConstantIsConstant) {
     EXPECT_NEAR(sky_radiance(sky, {0, 1, 0}).z, 0.62f, 1e-5);
     EXPECT_NEAR(sky_radiance(sky, {1, 0, 0}).z, 0.84f, 1e-5);
     EXPECT_NEAR(sky_radiance(sky, {0, -1, 0}).z, 0.16f, 1e-5);
-    const SkyParams flat = sky_params({.color = {0.5f, 0.6f, 0.8f}, .intensity = 2});
+    const SkyParams flat = sky_params(kiln::Environment{.color = {0.5f, 0.6f, 0.8f}, .intensity = 2});
     for (const vec3 d : {vec3{0, 1, 0}, vec3{1, 0, 0}, vec3{0, -1, 0}, normalize(vec3{1, 2, 3})}) {
         EXPECT_NEAR(sky_radiance(flat, d).x, 1, 1e-6);
         EXPECT_NEAR(sky_ambient(flat, d).y, 1.2, 1e-6);

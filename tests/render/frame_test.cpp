@@ -113,7 +113,7 @@ TEST_F(FrameGpu, ACameraInSolidSeesItAtOnceAndAnEmptyWorldIsSky) {
     field::worlds::World none{"none", {}, {.voxel_size = 0.1f, .bounds = {{-1, -1, -1}, {1, 1, 1}}}};
     Frame empty = frame_of(none);
     empty.camera.tone_map = ToneMap::None;
-    empty.environment = {.color = {0.25f, 0.5f, 0.125f}, .intensity = 1};
+    empty.environment = Environment{.color = {0.25f, 0.5f, 0.125f}};
     const Picture sky = picture(empty, {});
     for (size_t i = 0; i < sky.depth.size(); ++i) {
         ASSERT_TRUE(std::isinf(sky.depth[i]));
@@ -127,7 +127,7 @@ TEST_F(FrameGpu, AWhiteBallUnderAWhiteSkyDisappears) {
         Frame frame = frame_of(field::worlds::sphere_of(10));
         frame.materials.assign(2, Material{.base_color = {1, 1, 1}, .roughness = roughness, .metallic = 1});
         frame.lights.clear();
-        frame.environment = {.color = {1, 1, 1}, .intensity = 1};
+        frame.environment = Environment{.color = {1, 1, 1}};
         const Picture p = picture(frame, {});
         for (const float v : p.rgba) {
             if (v == 0) continue;  // alpha of misses

@@ -48,7 +48,7 @@ TEST_F(GoldenGpu, NormalsOfBlendedSolids) {
 
 TEST_F(GoldenGpu, LampsAndSoftShadows) {
     Frame frame = frame_of(on_ground());
-    frame.environment.intensity = 0.15f;
+    frame.environment->intensity = 0.15f;
     frame.lights = {{.kind = Light::Kind::Point,
                      .color = {1, 0.8f, 0.6f},
                      .position = {0.6f, 1.6f, 0.9f},

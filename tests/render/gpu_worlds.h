@@ -43,6 +43,7 @@ inline Frame frame_of(const field::worlds::World& world, vec3 eye = {2.2f, 1.5f,
     frame.materials[4].base_color = {0.3f, 0.7f, 0.3f};
     frame.materials[5].emissive = {0.4f, 0.2f, 0.0f};
     frame.lights.emplace_back();
+    frame.environment = Environment{};
     frame.camera.position = eye;
     frame.camera.tone_map = ToneMap::Neutral;
     return frame;

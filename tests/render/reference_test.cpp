@@ -28,7 +28,7 @@ ReferenceField sphere(const Material& material) {
 const Camera kFront{.position = {0, 0, 3}, .target = {0, 0, 0}};
 
 shade::SkyParams constant_sky(float radiance) {
-    return shade::sky_params({.color = {radiance, radiance, radiance}, .intensity = 1});
+    return shade::sky_params(Environment{.color = {radiance, radiance, radiance}});
 }
 
 }  // namespace

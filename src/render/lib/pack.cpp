@@ -59,22 +59,30 @@ static SkyParams sky_through(vec3 zenith, vec3 horizon, vec3 nadir) {
 }
 
 SkyParams sky_params(const Environment& environment) {
-    const vec3 c = environment.color * environment.intensity;
+    const vec3 c = (environment.file.empty() ? environment.color : vec3{1, 1, 1}) * environment.intensity;
     return sky_through(c, c, c);
+}
+
+SkyParams sky_params(const Frame& frame) {
+    if (frame.environment) return sky_params(*frame.environment);
+    for (const Light& light : frame.lights)
+        if (light.kind == Light::Kind::Directional && light.angular_diameter_deg > 0)
+            return with_disc(default_sky(), light);
+    return default_sky();
 }
 
 Light default_sun() {
     Light sun;
-    sun.direction = {-0.55f, -0.78f, -0.66f};
+    sun.direction = {0.21f, -0.67f, -0.71f};
     sun.color = {1.0f, 0.94f, 0.84f};
     sun.illuminance = 3.0f;
     sun.angular_diameter_deg = 0.53f;
     return sun;
 }
 
-SkyParams default_sky() {
-    SkyParams sky = sky_through({0.16f, 0.30f, 0.62f}, {0.62f, 0.72f, 0.84f}, {0.20f, 0.18f, 0.16f});
-    const Light sun = default_sun();
+SkyParams default_sky() { return sky_through({0.16f, 0.30f, 0.62f}, {0.62f, 0.72f, 0.84f}, {0.20f, 0.18f, 0.16f}); }
+
+SkyParams with_disc(SkyParams sky, const Light& sun) {
     const vec3 to_sun = unit_or(sun.direction * -1.0f, {0, 1, 0});
     const float cosine = std::cos(0.5f * radians(sun.angular_diameter_deg));
     // Illuminance over the disc's solid angle.

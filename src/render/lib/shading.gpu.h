@@ -17,11 +17,18 @@ KILN_FN vec3 shade_light(SurfaceView s, LightSample light, float visible) {
     return brdf_times_cosine(s, light.l) * light.illuminance * visible;
 }
 
-// Unoccluded sky light, off the base and by reflection. Under a constant sky of radiance 1 a white surface gives 1.
+// Where a mirror would look.
+KILN_FN vec3 reflected_view(SurfaceView s) { return s.n * (2.0f * dot(s.n, s.v)) - s.v; }
+
+// Light from all around: its cosine-weighted mean off the base, its mean over the lobe by reflection. Where both are 1, a white
+// surface gives 1.
+KILN_FN vec3 shade_around(SurfaceView s, vec3 ambient, vec3 reflection) {
+    return s.base_ambient * ambient + s.reflected * reflection;
+}
+
+// Unoccluded sky light.
 KILN_FN vec3 shade_sky(SurfaceView s, SkyParams sky) {
-    float n_v = dot(s.n, s.v);
-    vec3 r = s.n * (2.0f * n_v) - s.v;
-    return s.base_ambient * sky_ambient(sky, s.n) + s.reflected * sky_reflection(sky, r, s.alpha);
+    return shade_around(s, sky_ambient(sky, s.n), sky_reflection(sky, reflected_view(s), s.alpha));
 }
 
 #ifdef __cplusplus

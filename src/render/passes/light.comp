@@ -13,14 +13,20 @@ layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights[]; };
 layout(set = 0, binding = 3, std430) readonly buffer GgxTable { uint ggx_table[]; };
-layout(set = 0, binding = 4) uniform utexture2D visibility;
-layout(set = 0, binding = 5) uniform utexture2D surface_words;
-layout(set = 0, binding = 6) uniform texture2D visible_fractions;
-layout(set = 0, binding = 7) uniform texture2D radiance_before;  // of earlier batches; not read by the first
-layout(set = 0, binding = 8, rgba16f) writeonly uniform image2D radiance;
+layout(set = 0, binding = 4, std430) readonly buffer Environment { uint environment_words[]; };
+layout(set = 0, binding = 5) uniform utexture2D visibility;
+layout(set = 0, binding = 6) uniform utexture2D surface_words;
+layout(set = 0, binding = 7) uniform texture2D visible_fractions;
+layout(set = 0, binding = 8) uniform texture2D radiance_before;  // of earlier batches; not read by the first
+layout(set = 0, binding = 9, rgba16f) writeonly uniform image2D radiance;
 layout(push_constant) uniform Push { ShadowPush push; };
 
+// True: an image is all around, multiplied by the constant sky.
+layout(constant_id = 6) const bool kImageSky = false;
+
 uint ggx_table_word(uint i) { return ggx_table[i]; }
+uint environment_word(uint i) { return environment_words[i]; }
+#include "render/lib/environment.gpu.h"
 #include "render/lib/shading.gpu.h"
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
@@ -36,13 +42,22 @@ void main() {
     vec3 sum = vec3(0.0);
     if (!first) sum = texelFetch(radiance_before, pixel, 0).rgb;
     if ((seen.y >> 28u) == kSeenNothing) {
-        if (first) sum = sky_radiance(frame.sky, ray.direction);
+        if (first) sum = kImageSky ? environment_radiance(ray.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, ray.direction);
         imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 0.0));
         return;
     }
     SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
     SurfaceView view = surface_view(surface_optics(surface.albedo, surface.metallic, surface.roughness), surface.normal, -ray.direction);
-    if (first) sum = surface.emissive + surface.ambient * shade_sky(view, frame.sky);
+    if (first) {
+        vec3 around;
+        if (kImageSky) {
+            around = shade_around(view, environment_ambient(view.n), environment_reflection(reflected_view(view), view.optics.roughness));
+            around *= frame.sky.c0.rgb;
+        } else {
+            around = shade_sky(view, frame.sky);
+        }
+        sum = surface.emissive + surface.ambient * around;
+    }
     vec4 fractions = texelFetch(visible_fractions, pixel, 0);
     vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * frame.grid.voxel_size;
     for (uint i = 0u; i < kLightsAtOnce; ++i) {

@@ -5,7 +5,14 @@
 
 namespace kiln::render {
 
+namespace {
+constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
+}  // namespace
+
 const Kernel kLight{"light", kLightSpv};
+const Kernel kLightImage{"light image", kLightSpv, kWithImage};
+
+const Kernel& light_kernel(const TileInputs& in) { return in.image_sky ? kLightImage : kLight; }
 
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface) {
     Image radiance;
@@ -14,9 +21,10 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
         const ShadowPush push{.first_light = first, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0};
         const Image fractions = shadow(g, in, visibility, surface, push);
         Image sum = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
-        g.dispatch(kLight, in.size,
-                   {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table), g.read(visibility),
-                    g.read(surface.words), g.read(fractions), g.read(radiance ? radiance : fractions), g.write(sum)},
+        g.dispatch(light_kernel(in), in.size,
+                   {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table),
+                    g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions),
+                    g.read(radiance ? radiance : fractions), g.write(sum)},
                    push);
         radiance = sum;
         first += kLightsAtOnce;

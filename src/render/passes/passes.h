@@ -15,7 +15,7 @@ namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons, kLight,
-    kTonemap, kView;
+    kLightImage, kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
@@ -38,11 +38,13 @@ struct TileInputs {
     Buffer materials;  // MaterialRecord
     Buffer lights;     // LightRecord
     Buffer ggx_table;
+    Buffer environment;  // EnvironmentMap::words; a dummy unless image_sky
     uint32_t light_count = 0;
     rhi::Extent size;       // of the tile
     bool exact = false;     // some code is marched: analytic, or edits leave the grid
     bool analytic = false;  // … instead of the bricks
     bool horizons = false;  // exact code is half-spaces outside the grid, no more
+    bool image_sky = false;
     TapeUse use;
 };
 
@@ -62,6 +64,7 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& visibility);
 const Kernel& shadow_kernel(const TileInputs& in);
 // Visible fractions of the discs of lights push.first_light … + 3, a channel each.
 Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);
+const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure.
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
 // Exposed, tone-mapped, sRGB-encoded.
