@@ -72,9 +72,10 @@ struct Frame {
 struct RenderSettings {
     int width = 1280, height = 720;  ///< pixels, 1 to 16384
     View view = View::Shaded;
-    bool analytic = false;       ///< march the exact program instead of the bricks (D15)
-    bool unpruned = false;       ///< with analytic: every edit at every step, no culling
-    bool accelerate = true;      ///< false: visit every cell and voxel (the slow twin of the jumps)
+    bool analytic = false;   ///< march the exact program instead of the bricks (D15)
+    bool unpruned = false;   ///< with analytic: every edit at every step, no culling
+    bool accelerate = true;  ///< false: visit every cell and voxel (the slow twin of the jumps)
+    bool refine = true;  ///< what bricks show is moved to where the exact program has it, with its normal and materials
     bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
 };
 

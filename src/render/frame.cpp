@@ -60,6 +60,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.height = p.tile_height = height;
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
               (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
+              (settings.refine && !settings.analytic ? kFrameRefine : 0u) |
               (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
@@ -86,30 +87,64 @@ std::vector<MaterialRecord> material_records(const Frame& frame) {
     return out;
 }
 
-TileResult record_tile(Graph& g, const TileInputs& in, View wanted, bool want_visibility) {
+namespace {
+
+// Four words a pixel as an image. Copies want rows of whole 256 bytes.
+Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::span<const uint32_t> words) {
+    const size_t row = size_t(size.width) * 4, padded = (row + 63) / 64 * 64;
+    std::vector<uint32_t> rows(padded * size.height);
+    for (size_t y = 0; y < size.height; ++y)
+        std::copy_n(words.begin() + ptrdiff_t(y * row), row, rows.begin() + ptrdiff_t(y * padded));
+    Image out = g.create(name, {.size = size, .format = rhi::Format::Rgba32Uint});
+    const CopyRegion all{.bytes_per_row = uint32_t(padded * 4), .rows_per_layer = size.height, .size = size};
+    g.copy(g.upload(name, std::span<const uint32_t>(rows)), out, std::span(&all, 1));
+    return out;
+}
+
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image& refined) {
     TileResult out;
-    const Visibility seen = march(g, in);
-    const Surface surface = resolve(g, in, seen.words);
+    const Surface surface = resolve(g, in, words, refined);
     if (wanted == View::Shaded) {
-        const Image radiance = light(g, in, seen.words, surface);
+        const Image radiance = light(g, in, surface.seen, surface);
         const Image shown = tonemap(g, in, radiance);
         out.radiance = g.readback(radiance);
         out.shown = g.readback(shown);
     } else {
-        const Shown shown = view(g, in, seen.words, surface);
+        const Shown shown = view(g, in, words, surface);
         out.radiance = g.readback(shown.values);
         out.shown = g.readback(shown.bytes);
     }
     out.depth = g.readback(surface.depth);
-    if (want_visibility) out.visibility = g.readback(seen.words);
+    return out;
+}
+
+}  // namespace
+
+TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
+    const Visibility seen = march(g, in);
+    TileResult out = record_shading(g, in, wanted, seen.words, in.refine ? refine(g, in, seen.words) : seen.words);
     for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
     return out;
+}
+
+TileSeen record_visibility(Graph& g, const TileInputs& in) {
+    const Visibility seen = march(g, in);
+    TileSeen out{g.readback(seen.words), {}};
+    for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
+    return out;
+}
+
+TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<const uint32_t> visibility,
+                       std::span<const uint32_t> refined) {
+    const Image words = image_of_words(g, "visibility", in.size, visibility);
+    return record_shading(g, in, wanted, words, image_of_words(g, "refined", in.size, refined));
 }
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
     if (!in.analytic) out.push_back(&kMarch);
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
+    if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(in.exact ? &specialised(kResolveExact, in.use) : &kResolve);
     if (view != View::Shaded) {
         out.push_back(&kView);

@@ -14,13 +14,21 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
 std::vector<MaterialRecord> material_records(const Frame& frame);
 
 struct TileResult {
-    Readback radiance;    // 4 halves a pixel; of a view: 4 floats
-    Readback shown;       // 4 bytes a pixel
-    Readback depth;       // a float a pixel
-    Readback visibility;  // 4 words a pixel; only when asked for
+    Readback radiance;  // 4 halves a pixel; of a view: 4 floats
+    Readback shown;     // 4 bytes a pixel
+    Readback depth;     // a float a pixel
     std::vector<Readback> evaluations;
 };
-TileResult record_tile(Graph& g, const TileInputs& in, View view, bool want_visibility = false);
+TileResult record_tile(Graph& g, const TileInputs& in, View view);
+
+// The same in two graphs, where the host refines between them.
+struct TileSeen {
+    Readback visibility;  // 4 words a pixel
+    std::vector<Readback> evaluations;
+};
+TileSeen record_visibility(Graph& g, const TileInputs& in);
+TileResult record_tile(Graph& g, const TileInputs& in, View view, std::span<const uint32_t> visibility,
+                       std::span<const uint32_t> refined);
 
 // Kernels of a frame, for warm-up.
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view);

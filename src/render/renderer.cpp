@@ -14,6 +14,7 @@
 #include "rhi/create.h"
 
 #include <algorithm>
+#include <chrono>
 
 namespace kiln {
 
@@ -55,6 +56,8 @@ struct Renderer::Impl {
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                              Picture& picture);
+    // Software devices run the tape many times slower than our SIMD.
+    bool refines_on_host() const { return device->info().kind == rhi::DeviceKind::Cpu; }
     // The switches of a frame; its resources are still to come.
     TileInputs inputs(const Frame& frame, const RenderSettings& settings) const {
         TileInputs in;
@@ -62,7 +65,9 @@ struct Renderer::Impl {
         in.analytic = settings.analytic;
         in.exact = settings.analytic || field->leaves_grid();
         in.horizons = !settings.analytic && field->outside_is_concave();
+        in.refine = settings.refine && !settings.analytic && !refines_on_host();
         in.use = field->use(!settings.analytic);
+        in.use_of_bricks = field->use(false);
         return in;
     }
     void add_times(const FrameTimes& times);
@@ -122,44 +127,66 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
 
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                                          Picture& picture) {
-    Graph g(*runner);
-    TileInputs in = inputs(frame, settings);
-    in.field = field->import(g);
-    in.frame = g.block(params);
-    const FrameRay no_ray{};
-    in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
-    const std::vector<MaterialRecord> materials = material_records(frame);
-    in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
-    std::vector<shade::LightRecord> lights;
-    for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
-    in.light_count = uint32_t(lights.size());
-    if (lights.empty()) lights.emplace_back();
-    in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
-    in.ggx_table = g.import("ggx albedo", ggx_table);
-    const uint32_t nothing[4] = {};
-    in.environment = in.image_sky ? g.import("environment", environment)
-                                  : g.upload("no environment", std::span<const uint32_t>(nothing));
-    in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+    const auto inputs_on = [&](Graph& g) {
+        TileInputs in = inputs(frame, settings);
+        in.field = field->import(g);
+        in.frame = g.block(params);
+        const FrameRay no_ray{};
+        in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
+        const std::vector<MaterialRecord> materials = material_records(frame);
+        in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
+        std::vector<shade::LightRecord> lights;
+        for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
+        in.light_count = uint32_t(lights.size());
+        if (lights.empty()) lights.emplace_back();
+        in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
+        in.ggx_table = g.import("ggx albedo", ggx_table);
+        const uint32_t nothing[4] = {};
+        in.environment = in.image_sky ? g.import("environment", environment)
+                                      : g.upload("no environment", std::span<const uint32_t>(nothing));
+        in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+        return in;
+    };
+    const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
+        auto submit = runner->execute(g);
+        if (!submit) return submit.error();
+        for (const Readback& counted : evaluations) {
+            auto words = counted.get_as<uint32_t>();
+            if (!words) return words.error();
+            for (const uint32_t n : *words) stats.evaluations += n;
+        }
+        if (!device->caps().timestamp) return {};
+        auto times = runner->times(*submit);
+        if (!times) return times.error();
+        add_times(*times);
+        return {};
+    };
 
-    const TileResult tile = record_tile(g, in, settings.view);
-    auto submit = runner->execute(g);
-    if (!submit) return submit.error();
+    std::vector<uint32_t> visibility, refined;
+    const bool on_host = refines_on_host() && (params.flags & kFrameRefine) != 0;
+    if (on_host) {
+        Graph first(*runner);
+        const TileSeen seen = record_visibility(first, inputs_on(first));
+        if (auto done = run(first, seen.evaluations); !done) return done;
+        auto words = seen.visibility.get_as<uint32_t>();
+        if (!words) return words.error();
+        visibility = std::move(*words);
+        const auto start = std::chrono::steady_clock::now();
+        refined = refine_on_host(*field->field(), params, visibility);
+        const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        add_times({.passes = {{.name = "refine", .ms = ms}}, .total_ms = ms});
+    }
+    Graph g(*runner);
+    const TileInputs in = inputs_on(g);
+    const TileResult tile =
+        on_host ? record_tile(g, in, settings.view, visibility, refined) : record_tile(g, in, settings.view);
+    if (auto done = run(g, tile.evaluations); !done) return done;
     auto radiance = tile.radiance.get();
     if (!radiance) return radiance.error();
     auto shown = tile.shown.get();
     if (!shown) return shown.error();
     auto depth = tile.depth.get_as<float>();
     if (!depth) return depth.error();
-    for (const Readback& counted : tile.evaluations) {
-        auto words = counted.get_as<uint32_t>();
-        if (!words) return words.error();
-        for (const uint32_t n : *words) stats.evaluations += n;
-    }
-    if (device->caps().timestamp) {
-        auto times = runner->times(*submit);
-        if (!times) return times.error();
-        add_times(*times);
-    }
     place_tile(picture, params.tile_x, params.tile_y, params.tile_width, params.tile_height, *radiance, *shown, *depth);
     return {};
 }

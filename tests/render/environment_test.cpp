@@ -37,9 +37,8 @@ vec3 direction_at(double u, double v) {
 }
 
 image::FloatPixels image_of_directions(int width, int height, const std::function<vec3(vec3)>& color) {
-    return image_of(width, height, [&](int x, int y) {
-        return color(direction_at((x + 0.5) / width, (y + 0.5) / height));
-    });
+    return image_of(width, height,
+                    [&](int x, int y) { return color(direction_at((x + 0.5) / width, (y + 0.5) / height)); });
 }
 
 // Mean of `color` with weights by direction, summed over the sphere.
@@ -60,18 +59,26 @@ vec3 mean_over_sphere(const std::function<vec3(vec3)>& color, const std::functio
 
 // No symmetry, and nothing that nine harmonics do not hold.
 vec3 smooth(vec3 d) {
-    return {1 + 0.5f * d.x + 0.3f * d.y * d.z, 1 - 0.4f * d.z + 0.3f * d.x * d.y, 1 + 0.6f * d.y * d.y - 0.5f * d.x * d.z};
+    return {1 + 0.5f * d.x + 0.3f * d.y * d.z, 1 - 0.4f * d.z + 0.3f * d.x * d.y,
+            1 + 0.6f * d.y * d.y - 0.5f * d.x * d.z};
 }
 
-const vec3 kDirections[] = {{1, 0, 0},  {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1},
-                            {0, 0, -1}, normalize(vec3{1, 2, -3}), normalize(vec3{-2, -1, 0.5f})};
+const vec3 kDirections[] = {{1, 0, 0},
+                            {-1, 0, 0},
+                            {0, 1, 0},
+                            {0, -1, 0},
+                            {0, 0, 1},
+                            {0, 0, -1},
+                            normalize(vec3{1, 2, -3}),
+                            normalize(vec3{-2, -1, 0.5f})};
 
 }  // namespace
 
 TEST(Environment, ConstantImagesGiveTheirRadianceEverywhere) {
     for (const int width : {2, 7, 64}) {
-        const EnvironmentMap map =
-            make_environment_map(image_of(width, std::max(width / 2, 1), [](int, int) { return vec3{0.25f, 0.7f, 30}; }));
+        const EnvironmentMap map = make_environment_map(image_of(width, std::max(width / 2, 1), [](int, int) {
+            return vec3{0.25f, 0.7f, 30};
+        }));
         EnvironmentLight light{map.words};
         for (const vec3 d : kDirections) {
             EXPECT_NEAR(light.environment_radiance(d).y, 0.7, 1e-6);
@@ -115,7 +122,9 @@ TEST(Environment, AmbientIsTheCosineWeightedMean) {
         EXPECT_LE(length(light.environment_ambient(n) - expected), 2e-3f) << n.x << " " << n.y << " " << n.z;
     }
     // A small bright sun is more than nine harmonics hold; what they leave out is known to be small.
-    const auto sunny = [](vec3 d) { return dot(d, normalize(vec3{1, 1, 0.5f})) > 0.98f ? vec3{40, 40, 40} : vec3{1, 1, 1}; };
+    const auto sunny = [](vec3 d) {
+        return dot(d, normalize(vec3{1, 1, 0.5f})) > 0.98f ? vec3{40, 40, 40} : vec3{1, 1, 1};
+    };
     const EnvironmentMap sun = make_environment_map(image_of_directions(256, 128, sunny));
     EnvironmentLight of_sun{sun.words};
     for (const vec3 n : kDirections) {
@@ -149,8 +158,9 @@ TEST(Environment, SameWordsForAnyNumberOfWorkers) {
 }
 
 TEST(Environment, WhatIsNegativeCountsAsNothingAndLargeImagesAreMadeSmaller) {
-    const EnvironmentMap map =
-        make_environment_map(image_of(kEnvironmentWidth + 2, 2, [](int x, int) { return vec3{x % 2 ? 2.0f : -5.0f, 1, 1}; }));
+    const EnvironmentMap map = make_environment_map(image_of(kEnvironmentWidth + 2, 2, [](int x, int) {
+        return vec3{x % 2 ? 2.0f : -5.0f, 1, 1};
+    }));
     EXPECT_EQ(map.words[kEnvironmentLevels + 1], uint(kEnvironmentWidth));
     EnvironmentLight light{map.words};
     EXPECT_NEAR(light.environment_ambient({0, 1, 0}).x, 1, 1e-4);
@@ -164,13 +174,16 @@ TEST(Environment, WhiteFurnaceOfTheReference) {
         const ReferenceField ball{
             .distance = [](dvec3 p) { return std::sqrt(p.x * p.x + p.y * p.y + p.z * p.z) - 1; },
             .normal = {},
-            .material = [=](dvec3) { return Material{.base_color = {1, 1, 1}, .roughness = 0.5f, .metallic = metallic}; },
+            .material =
+                [=](dvec3) {
+                    return Material{.base_color = {1, 1, 1}, .roughness = 0.5f, .metallic = metallic};
+                },
             .bounds = {{-1, -1, -1}, {1, 1, 1}}};
         for (const int samples : {0, 256}) {
-            const ReferencePicture picture = render_reference(
-                ball, {}, sky_params(Environment{.intensity = 2, .file = "constant"}),
-                Camera{.position = {0, 0, 3}, .target = {0, 0, 0}},
-                {.width = 12, .height = 12, .samples = samples, .environment = &map});
+            const ReferencePicture picture =
+                render_reference(ball, {}, sky_params(Environment{.intensity = 2, .file = "constant"}),
+                                 Camera{.position = {0, 0, 3}, .target = {0, 0, 0}},
+                                 {.width = 12, .height = 12, .samples = samples, .environment = &map});
             for (size_t i = 0; i < 144; ++i)
                 EXPECT_NEAR(picture.rgba[4 * i], 1, 0.01 + 4 * picture.standard_error[i]) << samples << " " << metallic;
         }

@@ -67,8 +67,8 @@ TEST_F(FrameGpu, BricksShowWhatTheProgramsSay) {
         EXPECT_GT(hits, 500) << world.name;
         EXPECT_GT(judged, hits / 3) << world.name;
         EXPECT_EQ(misses, 0) << world.name;
-        EXPECT_LE(off, judged / 100) << world.name << ": depth, of " << judged;
-        EXPECT_LE(turned, judged / 50) << world.name << ": normals, of " << judged;
+        EXPECT_EQ(off, 0) << world.name << ": depth, of " << judged;
+        EXPECT_LE(turned, judged / 500) << world.name << ": normals, of " << judged;
         EXPECT_LE(pruning, hits / 500) << world.name << ": pruned and unpruned differ";
     }
 }

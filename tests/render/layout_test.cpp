@@ -59,8 +59,8 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
     EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, exposure) + 12);
-    for (const Kernel* kernel :
-         {&kMarch, &kMarchExact, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
+    for (const Kernel* kernel : {&kMarch, &kMarchExact, &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact,
+                                 &kLight, &kTonemap, &kView}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, 0);
         ASSERT_TRUE(b) << kernel->name;
@@ -105,8 +105,9 @@ TEST(Layout, PushDataIsTheSame) {
 }
 
 TEST(Layout, EveryKernelFitsTheFloor) {
-    for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact,
-                                 &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
+    for (const Kernel* kernel :
+         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact, &kRefine, &kResolve,
+          &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

@@ -73,8 +73,8 @@ TEST(PicturesGpu, BricksShowWhatTheProgramSaysInEveryScene) {
         EXPECT_LE(differ, settings.width * settings.height / 1000) << name;
         EXPECT_EQ(differ_inside, 0) << name;
         EXPECT_GT(judged, 500) << name;
-        // A trilinear surface rounds creases by up to half a voxel; the quarry is hardly anything but creases.
-        EXPECT_LE(double(off), 0.04 * judged) << name;
+        // What is left: ledges lower than 2 % of their distance, which the quarry has everywhere, and tangent rays.
+        EXPECT_LE(off, judged / 200) << name << " of " << judged;
     }
 }
 

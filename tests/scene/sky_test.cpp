@@ -161,8 +161,10 @@ TEST_F(SkyImages, SkyGpuLightsAsThePathTracerSays) {
     std::vector<float> values;
     for (int y = 0; y < height; ++y) {
         for (int x = 0; x < width; ++x) {
-            const double turn = 2 * 3.14159265358979 * ((x + 0.5) / width - 0.5), fall = 3.14159265358979 * (y + 0.5) / height;
-            const double dx = std::sin(fall) * std::sin(turn), dy = std::cos(fall), dz = -std::sin(fall) * std::cos(turn);
+            const double turn = 2 * 3.14159265358979 * ((x + 0.5) / width - 0.5),
+                         fall = 3.14159265358979 * (y + 0.5) / height;
+            const double dx = std::sin(fall) * std::sin(turn), dy = std::cos(fall),
+                         dz = -std::sin(fall) * std::cos(turn);
             for (const double c : {1 + 0.8 * dx, 1 + 0.8 * dy, 1 - 0.8 * dz}) values.push_back(float(c));
         }
     }
@@ -182,7 +184,8 @@ TEST_F(SkyImages, SkyGpuLightsAsThePathTracerSays) {
         if (alpha > 0 && alpha < 1) continue;  // the rim
         (alpha > 0 ? balls : skies) += 1;
         for (size_t c = 0; c < 3; ++c)
-            EXPECT_NEAR(drawn->rgba[4 * i + c], traced->rgba[4 * i + c], alpha > 0 ? 0.06 : 0.02) << i << " of " << alpha;
+            EXPECT_NEAR(drawn->rgba[4 * i + c], traced->rgba[4 * i + c], alpha > 0 ? 0.06 : 0.02)
+                << i << " of " << alpha;
     }
     EXPECT_GT(balls, 200);
     EXPECT_GT(skies, 200);

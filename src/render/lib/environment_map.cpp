@@ -65,8 +65,7 @@ std::array<std::array<double, 3>, 9> harmonics(const Equirect& image) {
         // Integrals between two polar angles of {1, c, 3 c² - 1} s, {1, c} s², s³ for c, s the cosine and sine.
         const auto integrals = [&](double angle) {
             const double c = std::cos(angle), s = std::sin(angle);
-            return std::array{-c,  -c * c / 2, c - c * c * c, angle / 2 - s * c / 2, s * s * s / 3,
-                              c * c * c / 3 - c};
+            return std::array{-c, -c * c / 2, c - c * c * c, angle / 2 - s * c / 2, s * s * s / 3, c * c * c / 3 - c};
         };
         auto down = integrals(std::numbers::pi * (j + 1) / image.height);
         const auto top = integrals(std::numbers::pi * j / image.height);
@@ -75,9 +74,9 @@ std::array<std::array<double, 3>, 9> harmonics(const Equirect& image) {
             // x = s sin(turn), z = -s cos(turn): the middle of the image is -Z.
             const double a = kTurn * (double(i) / image.width - 0.5), b = kTurn * (double(i + 1) / image.width - 0.5);
             const double one = b - a, x = std::cos(a) - std::cos(b), z = std::sin(a) - std::sin(b);
-            const double xz = (std::cos(2 * b) - std::cos(2 * a)) / 4;          // of -sin cos
-            const double xx_zz = (std::sin(2 * a) - std::sin(2 * b)) / 2;       // of sin² - cos²
-            const double y[9] = {down[0] * one, down[1] * one, down[3] * x, down[3] * z, down[4] * x,
+            const double xz = (std::cos(2 * b) - std::cos(2 * a)) / 4;     // of -sin cos
+            const double xx_zz = (std::sin(2 * a) - std::sin(2 * b)) / 2;  // of sin² - cos²
+            const double y[9] = {down[0] * one, down[1] * one, down[3] * x,   down[3] * z,    down[4] * x,
                                  down[4] * z,   down[5] * xz,  down[2] * one, down[5] * xx_zz};
             const vec3 c = image.at(i, j);
             for (size_t k = 0; k < 9; ++k) {

@@ -14,8 +14,8 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchExact, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons, kLight,
-    kLightImage, kTonemap, kView;
+extern const Kernel kMarch, kMarchExact, kRefine, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons,
+    kLight, kLightImage, kTonemap, kView;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
@@ -45,7 +45,9 @@ struct TileInputs {
     bool analytic = false;  // … instead of the bricks
     bool horizons = false;  // exact code is half-spaces outside the grid, no more
     bool image_sky = false;
-    TapeUse use;
+    bool refine = false;  // by the device: the host may do it
+    TapeUse use;          // of the code that is marched and resolved
+    TapeUse use_of_bricks;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -58,8 +60,16 @@ Visibility march(Graph& g, const TileInputs& in);
 struct Surface {
     Image words;  // packed G-buffer, see surface.glsl
     Image depth;  // metres along the ray, +infinity where nothing is hit
+    Image seen;   // visibility words, with t where the surface is
 };
-Surface resolve(Graph& g, const TileInputs& in, const Image& visibility);
+// `refined`: what refine() answers; any image of words without kFrameRefine.
+Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+
+// What the bricks' code says of the points that march found in them; see refine.comp.
+Image refine(Graph& g, const TileInputs& in, const Image& visibility);
+// The same words from the same visibility words, made here: software devices run the tape many times slower.
+std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParams& frame,
+                                     std::span<const uint32_t> visibility);
 
 const Kernel& shadow_kernel(const TileInputs& in);
 // Visible fractions of the discs of lights push.first_light … + 3, a channel each.

@@ -12,14 +12,17 @@ layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialRec
 layout(set = 0, binding = 6) uniform texture3D distances;
 layout(set = 0, binding = 7) uniform utexture3D materials;
 layout(set = 0, binding = 8) uniform utexture2D visibility;
-layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 10, r32f) writeonly uniform image2D depth;  // metres along the ray
+layout(set = 0, binding = 9) uniform utexture2D refined;  // see refine.comp; not read without kFrameRefine
+layout(set = 0, binding = 10, rgba32ui) writeonly uniform uimage2D surface_words;
+layout(set = 0, binding = 11, r32f) writeonly uniform image2D depth;  // metres along the ray
+layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D visibility_now;
 #ifdef KILN_EXACT
-layout(set = 0, binding = 11, std430) readonly buffer Code { uvec2 code[]; };
-layout(set = 0, binding = 12, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
-layout(set = 0, binding = 13, std430) readonly buffer Numbers { float numbers[]; };
+layout(set = 0, binding = 13, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 14, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 15, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 
+#include "render/passes/refine.gpu.h"
 #define KILN_FIELD_SURFACE
 #include "render/passes/field.glsl"
 #include "render/passes/rays.glsl"
@@ -55,13 +58,22 @@ void main() {
     int slot = int(seen.y & 0x0fffffffu);
     float t = uintBitsToFloat(seen.x);
     if (state == kSeenNothing) {
+        imageStore(visibility_now, pixel, seen);
         imageStore(surface_words, pixel, uvec4(0u));
         imageStore(depth, pixel, vec4(uintBitsToFloat(0x7f800000u)));
         return;
     }
     TexelRay ray = pixel_ray(pixel);
     SurfaceSample s = SurfaceSample(vec3(0.0), -ray.direction, 0.0, 0.0, 1.0, kSurfaceHit, vec3(0.0));
-    if (state == kSeenBrick) {
+    uvec4 asked = uvec4(kNotRefined);
+    if (state == kSeenBrick && (frame.flags & kFrameRefine) != 0u) asked = texelFetch(refined, pixel, 0);
+    if (asked.x != kNotRefined) {
+        t = uintBitsToFloat(asked.x);
+        s.normal = unpack_unit(asked.y);
+        float share = uintBitsToFloat(asked.w);
+        add_material(s, asked.z & 0xffffu, 1.0 - share);
+        if (share > 0.0) add_material(s, asked.z >> 16u, share);
+    } else if (state == kSeenBrick) {
         BrickRecord record = records[slot];
         ivec3 texel = ivec3(record.texel_x, record.texel_y, record.texel_z);
         ivec3 voxel = ivec3(seen.z & 7u, (seen.z >> 3u) & 7u, (seen.z >> 6u) & 7u);
@@ -76,9 +88,8 @@ void main() {
         uvec2 here_code = code_of(state, slot);
         float h = frame.grid.voxel_size;
         vec3 p_world = (vec3(ray.whole) + ray.part) * h + ray.direction * (t * h);
-        // Central differences: a tenth of a voxel, but never so little that the position's own rounding shows.
         vec3 size = abs(p_world);
-        float step = max(0.1 * h, 3e-4 * max(max(size.x, size.y), size.z));
+        float step = refine_gradient_step(h, max(max(size.x, size.y), size.z));
         if (state == kSeenOutside) step = max(step, 0.25 * frame.pixel_angle * t * h);
         vec3 gradient = vec3(0.0);
         Mix mixed = make_mix(0.0, float(kNoMaterial), 0.0);
@@ -100,6 +111,8 @@ void main() {
     } else {
         add_material(s, 0u, 1.0);
     }
+    seen.x = floatBitsToUint(t);
+    imageStore(visibility_now, pixel, seen);
     imageStore(surface_words, pixel, pack_surface(s));
     imageStore(depth, pixel, vec4(t * frame.grid.voxel_size));
 }
