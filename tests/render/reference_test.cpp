@@ -168,7 +168,7 @@ TEST(Reference, MarchedSoftShadowsAgreeWithCountedRays) {
         const shade::LightSample light = shade::sample_light(shade::light_record(lamp), {x, 0, 0});
         const double unshadowed = light.illuminance.x * light.l.y / std::numbers::pi;
         const double marched =
-            shadow.shadow_visible({x, 0, 0}, light.l, light.tan_radius, {1e-3f, light.distance, 1e-4f, 256});
+            shadow.shadow_visible({x, 0, 0}, light.l, light.tan_radius, {1e-3f, light.distance, 1e-4f, 1e30f, 256});
         EXPECT_TRUE(lit == 0 || std::fabs(lit - unshadowed) < 1e-3 * unshadowed) << lit << " " << unshadowed;
         worst = std::max(worst, std::fabs(soft / unshadowed - marched));
         mean += soft / unshadowed - marched;

@@ -13,6 +13,7 @@ using kiln::vec3;
 
 namespace {
 
+constexpr float kKnown = 1e30f;                      // fields that tell every distance
 constexpr float kLightHeight = 5, kLightRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
 
 float box_distance(vec3 p, vec3 lo, vec3 hi) {
@@ -47,7 +48,7 @@ float visible_from(const Field& field, float x) {
     const float distance = length(to_light);
     SoftShadow shadow{field};
     return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance,
-                                 {1e-3f, distance, 1e-4f, 256});
+                                 {1e-3f, distance, 1e-4f, kKnown, 256});
 }
 
 // Where along x the fraction is f.
@@ -120,7 +121,7 @@ TEST(SoftShadow, UnoccludedPlaneDoesNotShadowItself) {
             const float offset = 0.01f;  // the start is one voxel off the surface
             SoftShadow shadow{plane};
             const float seen = shadow.shadow_visible({0, offset, 0}, {std::sin(a), std::cos(a), 0}, tan_radius,
-                                                     {offset, 100, 1e-4f, 256});
+                                                     {offset, 100, 1e-4f, kKnown, 256});
             EXPECT_GE(seen, 0.99f) << degrees << " degrees, disc " << tan_radius;
         }
     }
@@ -134,7 +135,7 @@ TEST(SoftShadow, HardShadowEndsAtTheProjectedEdge) {
         const vec3 to_light{-x, kLightHeight, 0};
         SoftShadow shadow{field};
         const float seen =
-            shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, 256});
+            shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, kKnown, 256});
         EXPECT_EQ(seen, x > 0 ? 1.0f : 0.0f) << x;
     }
 }
@@ -166,22 +167,29 @@ TEST(SoftShadow, AWireHidesAStrip) {
     }
 }
 
-TEST(SoftShadow, PartsOfADiscMakeUpTheDisc) {
-    // A corner: neither straight edge alone. Two quarter planes at height 2 leave a quarter of the disc.
-    const auto corner = [](vec3 p) {
-        return std::min({p.y, box_distance(p, {-100, 2, -100}, {0, 2.002f, 100}),
-                         box_distance(p, {-100, 2, -100}, {100, 2.002f, 0})});
-    };
-    const int parts = 64;
-    float seen = 0;
-    SoftShadow shadow{corner};
-    for (int i = 0; i < parts; ++i) {
-        const kiln::vec2 at = shadow.shadow_sub_disc(i, parts, 0.3f);
-        const vec3 l = shadow.shadow_direction({0, 1, 0}, kLightRadius / kLightHeight, at);
-        const float tan_radius = kLightRadius / kLightHeight / std::sqrt(float(parts));
-        seen += shadow.shadow_visible({0, 0, 0}, l, tan_radius, {1e-3f, kLightHeight, 1e-4f, 256}) / parts;
+TEST(SoftShadow, BandsNarrowerThanTheConeDoNotNarrowThePenumbra) {
+    const double expected[][2] = {{-1, 0},        {-0.9, 0.0187}, {-0.75, 0.0721}, {-0.5, 0.19550}, {-0.25, 0.34252}, {0, 0.5},
+                                  {0.25, 0.65748}, {0.5, 0.80450}, {0.75, 0.9279},  {0.9, 0.9813},   {1, 1}};
+    for (const float h : {1.0f, 2.5f, 4.0f}) {
+        for (const float share : {0.95f, 0.8f, 0.5f, 0.25f, 0.12f}) {  // of the cone's radius where the edge is
+            const float band = share * kLightRadius * h / kLightHeight;
+            for (const auto& [offset, visible] : expected) {
+                const float x = float(offset) * kLightRadius * h / (kLightHeight - h);
+                const vec3 to_light{-x, kLightHeight, 0};
+                const float distance = length(to_light);
+                const auto seen = [&](const auto& field) {
+                    SoftShadow shadow{field, band};
+                    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance,
+                                                 {1e-3f, distance, 1e-4f, band, 512});
+                };
+                const double most = std::fabs(offset) > 0.7 ? 0.035 : 0.02;  // of the rim the last 3 % may go unseen
+                EXPECT_NEAR(seen(leaning_block(h)), visible, most)
+                    << "block, edge at " << offset << ", height " << h << ", band " << share;
+                EXPECT_NEAR(seen(half_plane(h, 0.01f)), visible, most)
+                    << "plate, edge at " << offset << ", height " << h << ", band " << share;
+            }
+        }
     }
-    EXPECT_NEAR(seen, 0.25, 0.02);
 }
 
 // Far inside a shadow one ray proves that all of the disc is covered; a thin wall takes one ray and six to the rim.
@@ -191,6 +199,6 @@ TEST(SoftShadow, DeepShadowsTakeOneRay) {
         ++samples;
         return std::min(p.y, box_distance(p, {-50, 1, -50}, {50, 9, 50}));
     }};
-    EXPECT_EQ(shadow.shadow_visible({0, 0, 0}, {0, 1, 0}, 0.1f, {1e-2f, 100, 1e-3f, 256}), 0);
+    EXPECT_EQ(shadow.shadow_visible({0, 0, 0}, {0, 1, 0}, 0.1f, {1e-2f, 100, 1e-3f, kKnown, 256}), 0);
     EXPECT_LE(samples, 40);
 }

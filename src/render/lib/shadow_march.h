@@ -12,15 +12,16 @@ using namespace kiln::gpu;
 template <typename Distance>
 struct SoftShadow {
     Distance distance;
+    float band = 1e30f;  // metres: what a baked field would know
 
     vec2 shadow_field(vec3 p) {
         const float d = distance(p);
-        return {d, std::fabs(d)};
+        return {d > band ? 1e30f : max(d, -band), min(std::fabs(d), band)};
     }
 #include "render/lib/soft_shadow.gpu.h"
 };
 
 template <typename Distance>
-SoftShadow(Distance) -> SoftShadow<Distance>;
+SoftShadow(Distance, float = 0) -> SoftShadow<Distance>;
 
 }  // namespace kiln::render::shade

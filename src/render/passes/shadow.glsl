@@ -87,11 +87,11 @@ vec2 shadow_field(vec3 p) {
         float d = sampled_distance(slot, in_cell);
         return vec2(d >= kSaturatedVoxels ? kFarAway : d, max(abs(d) - kTrilinearErrorVoxels, 0.01));
     }
-    if ((word & kCellInside) != 0u) return vec2(-kFarAway, 1.0);
     // To the nearest face of the cube of cells that are empty.
     vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
     float rim = min(min(to_face.x, to_face.y), to_face.z) + float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
-    return vec2(kFarAway, max(rim, 0.0) + kClearOfEmptyCell);
+    float least = max(rim, 0.0) + kClearOfEmptyCell;
+    return (word & kCellInside) != 0u ? vec2(-least, least) : vec2(kFarAway, least);
 }
 
 #include "render/lib/soft_shadow.gpu.h"
@@ -105,9 +105,6 @@ float above_horizons(vec3 p, vec3 l, float tan_radius, float distance_voxels) {
     return tan_radius > 0.0 ? disc_visible(height / (far * tan_radius)) : (height > 0.0 ? 1.0 : 0.0);
 }
 #endif
-
-// Wide discs are cut into parts, so that each part's cone stays in the band that bricks store.
-int disc_parts(float tan_radius) { return tan_radius < 0.25 ? 1 : 4; }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -127,18 +124,12 @@ void main() {
         shadow_whole = ray.whole + ivec3(floor(from));
         vec3 p = from - floor(from);
         vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * h;
-        for (int i = 0; i < 4 * 16; ++i) {
-            int channel = i >> 4;
-            int part_index = i & 15;
+        for (int channel = 0; channel < int(kLightsAtOnce); ++channel) {
             uint index = push.first_light + uint(channel);
             if (index >= frame.light_count) break;
             LightSample light = sample_light(lights[index], p_world);
-            int parts = disc_parts(light.tan_radius);
-            if (part_index >= parts) continue;
-            if (dot(light.l, surface.normal) <= 0.0 || largest3(light.illuminance) <= 0.0) continue;
-            vec2 on_disc = shadow_sub_disc(part_index, parts, 0.0);
-            vec3 l = shadow_direction(light.l, light.tan_radius, on_disc);
-            if (dot(l, surface.normal) <= 0.0) continue;
+            vec3 l = light.l;
+            if (dot(l, surface.normal) <= 0.0 || largest3(light.illuminance) <= 0.0) continue;
             // Beyond the grid is only what code describes; it is looked at for some grid sizes.
             float t_in;
             float t_out;
@@ -147,12 +138,11 @@ void main() {
             bool concave = frame.outside_count != 0u && (frame.flags & (kFrameOutsideConcave | kFrameUnpruned)) == kFrameOutsideConcave;
             bool beyond = (frame.outside_count != 0u && !concave) || (frame.flags & kFrameUnpruned) != 0u;
             float t_last = min(light.distance / h, max(t_out, 0.0) + (beyond ? 16.0 * length(grid_size) : 2.0 * float(kBrickVoxels)));
-            float tan_radius = light.tan_radius * inversesqrt(float(parts));
-            float fraction = shadow_visible(p, l, tan_radius, ShadowMarch(0.5, t_last, 0.25, kShadowSteps));
+            float fraction = shadow_visible(p, l, light.tan_radius, ShadowMarch(0.5, t_last, 0.25, kSaturatedVoxels, kShadowSteps));
 #ifdef KILN_EXACT
-            if (concave && fraction > 0.0) fraction *= above_horizons(p, l, tan_radius, light.distance / h);
+            if (concave && fraction > 0.0) fraction *= above_horizons(p, l, light.tan_radius, light.distance / h);
 #endif
-            fractions[channel] += fraction / float(parts);
+            fractions[channel] = fraction;
         }
     }
     imageStore(visible_fractions, pixel, fractions);

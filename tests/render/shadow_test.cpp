@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: MIT
+// Gate G14 through bricks: the shadow buffer against closed forms, also where the light's cone is far wider than the band of
+// distances that bricks store.
+#include "gpu_worlds.h"
+#include "render/lib/pack.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace kiln::render {
+namespace {
+
+constexpr float kVoxel = 0.02f;
+constexpr float kLightHeight = 5, kLightRadius = 0.5f;
+
+struct ShadowGpu : GpuTest {
+    // Visible fractions of the lamp above the origin from points (x, 0, 0) of a slab that ends at y = 0.
+    std::vector<float> fractions(const field::worlds::World& world, const std::vector<float>& places) {
+        const auto f = world.field();
+        GpuField gpu(*runner_);
+        rhi::must(gpu.update(f, Baker::Host));
+        FrameParams p{};
+        p.grid = gpu.grid();
+        p.distance_scale = gpu.distance_scale();
+        p.width = p.tile_width = int(places.size());
+        p.height = p.tile_height = 1;
+        p.flags = kFrameRays | kFrameAccelerate;
+        p.light_count = 1;
+        p.material_count = 1;
+        std::vector<FrameRay> rays;
+        for (const float x : places) {
+            // Down from a few voxels above the slab.
+            const float at = x / kVoxel;
+            FrameRay ray{};
+            ray.whole_x = int(std::floor(at)), ray.part_x = at - std::floor(at);
+            ray.whole_y = 6;
+            ray.direction_y = -1;
+            rays.push_back(ray);
+        }
+        const shade::LightRecord lamp = shade::light_record(
+            {.kind = Light::Kind::Point, .position = {0, kLightHeight, 0}, .intensity = 1, .radius = kLightRadius});
+        const MaterialRecord material{};
+        Graph g(*runner_);
+        TileInputs in;
+        in.field = gpu.import(g);
+        in.frame = g.block(p);
+        in.rays = g.upload("rays", std::span<const FrameRay>(rays));
+        in.materials = g.upload("materials", std::span<const MaterialRecord>(&material, 1));
+        in.lights = g.upload("lights", std::span<const shade::LightRecord>(&lamp, 1));
+        in.light_count = 1;
+        in.size = {uint32_t(places.size()), 1};
+        const Visibility seen = march(g, in);
+        const Surface surface = resolve(g, in, seen.words, seen.words);
+        const Readback bytes = g.readback(shadow(g, in, surface.seen, surface, {}));
+        const Readback depth = g.readback(surface.depth);
+        rhi::must(runner_->execute(g));
+        for (const float d : rhi::must(depth.get_as<float>())) EXPECT_NEAR(d, 6 * kVoxel, 0.1f * kVoxel);
+        std::vector<float> out;
+        for (const uint32_t word : rhi::must(bytes.get_as<uint32_t>())) out.push_back(float(word & 255u) / 255);
+        return out;
+    }
+};
+
+Edit box(vec3 low, vec3 high) {
+    return field::worlds::edit(Box{.half_extents = (high - low) * 0.5f}, (low + high) * 0.5f);
+}
+
+field::worlds::World slab_with(const std::string& name, const Edit& edit, vec3 low, vec3 high) {
+    return {name,
+            {box({low.x, -0.2f, low.z}, {high.x, 0, high.z}), edit},
+            {.voxel_size = kVoxel, .bounds = {{low.x, -0.2f, low.z}, high}}};
+}
+
+// Share of a disc past a straight edge at signed distance x from its middle, in radii.
+double past_edge(double x) {
+    const double c = std::clamp(x, -1.0, 1.0);
+    return 0.5 + (c * std::sqrt(1 - c * c) + std::asin(c)) / std::numbers::pi;
+}
+
+// Area that discs of radii r and s have in common, d apart.
+double common_area(double r, double s, double d) {
+    if (d >= r + s) return 0;
+    if (d <= std::fabs(r - s)) return std::numbers::pi * std::pow(std::min(r, s), 2);
+    const double a = (d * d + r * r - s * s) / (2 * d * r), b = (d * d + s * s - r * r) / (2 * d * s);
+    return r * r * (std::acos(a) - a * std::sqrt(1 - a * a)) + s * s * (std::acos(b) - b * std::sqrt(1 - b * b));
+}
+
+TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
+    // The cone is 2.5, 5 and 17 voxels wide at the edge.
+    for (const float h : {0.5f, 1.0f, 2.0f}) {
+        const float thickness = 0.06f;
+        const auto world = slab_with("plate", box({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
+                                     {1.2f, h + 0.2f, 0.9f});
+        std::vector<float> places;
+        std::vector<double> expected;
+        // Shadow rays start a voxel above the slab.
+        const double height = double(h) - double(kVoxel), far = double(kLightHeight) - double(kVoxel);
+        for (const double offset : {-1.3, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.3}) {
+            places.push_back(float(offset * double(kLightRadius) * height / (far - height)));
+            // The upper edge of the plate hides more than the lower one where the ray leans in.
+            double hidden = 0;
+            for (const double y : {height, height + double(thickness)}) {
+                const double middle = double(places.back()) * (1 - y / far), radius = double(kLightRadius) * y / far;
+                hidden = std::max(hidden, 1 - past_edge(middle / radius));
+            }
+            expected.push_back(1 - hidden);
+        }
+        const std::vector<float> seen = fractions(world, places);
+        for (size_t i = 0; i < places.size(); ++i)
+            EXPECT_NEAR(seen[i], expected[i], 0.02 + 0.005) << "edge at height " << h << ", from " << places[i];
+    }
+}
+
+TEST_F(ShadowGpu, ABallHidesWhatItCoversOfTheDisc) {
+    for (const float h : {1.0f, 2.0f}) {
+        const float r = 0.6f;
+        const auto world = slab_with("ball", field::worlds::edit(Sphere{.radius = r}, {0, h, 0}), {-1.6f, 0, -0.7f},
+                                     {1.6f, h + r + 0.1f, 0.7f});
+        std::vector<float> places;
+        std::vector<double> expected;
+        for (float x = 0; x < 1.5f; x += 0.1f) {
+            places.push_back(x);
+            // Angles seen from a voxel above the slab; discs on the sphere of directions, nearly flat at these sizes.
+            const double y = double(kVoxel), to_ball = std::hypot(double(x), double(h) - y),
+                         to_light = std::hypot(double(x), double(kLightHeight) - y);
+            const double ball = std::asin(double(r) / to_ball), light = std::atan(double(kLightRadius) / to_light);
+            const double apart = std::fabs(std::atan2(double(x), double(h) - y) -
+                                           std::atan2(double(x), double(kLightHeight) - y));
+            expected.push_back(1 - common_area(light, ball, apart) / (std::numbers::pi * light * light));
+        }
+        const std::vector<float> seen = fractions(world, places);
+        // One straight edge stands for a round one.
+        for (size_t i = 0; i < places.size(); ++i)
+            EXPECT_NEAR(seen[i], expected[i], 0.06) << "ball at height " << h << ", from " << places[i];
+    }
+}
+
+}  // namespace
+}  // namespace kiln::render
