@@ -39,8 +39,7 @@ TEST_F(RefineGpu, PointsLieOnTheSurfaceAndHostAndDeviceAgree) {
         const auto f = world.field();
         GpuField gpu(*runner_);
         rhi::must(gpu.update(f, Baker::Host));
-        FrameParams p =
-            rhi::must(frame_params(frame_of(world), {.width = 64, .height = 48, .accelerate = true}, gpu));
+        FrameParams p = rhi::must(frame_params(frame_of(world), {.width = 64, .height = 48, .accelerate = true}, gpu));
         const Words words = refined(gpu, p);
         const float h = p.grid.voxel_size;
         int found = 0, moved = 0, apart = 0, off = 0, turned = 0, other = 0;

@@ -124,8 +124,8 @@ TEST_F(ShadowGpu, ABallHidesWhatItCoversOfTheDisc) {
             const double y = double(kVoxel), to_ball = std::hypot(double(x), double(h) - y),
                          to_light = std::hypot(double(x), double(kLightHeight) - y);
             const double ball = std::asin(double(r) / to_ball), light = std::atan(double(kLightRadius) / to_light);
-            const double apart = std::fabs(std::atan2(double(x), double(h) - y) -
-                                           std::atan2(double(x), double(kLightHeight) - y));
+            const double apart =
+                std::fabs(std::atan2(double(x), double(h) - y) - std::atan2(double(x), double(kLightHeight) - y));
             expected.push_back(1 - common_area(light, ball, apart) / (std::numbers::pi * light * light));
         }
         const std::vector<float> seen = fractions(world, places);

@@ -13,7 +13,7 @@ using kiln::vec3;
 
 namespace {
 
-constexpr float kKnown = 1e30f;                      // fields that tell every distance
+constexpr float kKnown = 1e30f;                         // fields that tell every distance
 constexpr float kLightHeight = 5, kLightRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
 
 float box_distance(vec3 p, vec3 lo, vec3 hi) {
@@ -168,8 +168,9 @@ TEST(SoftShadow, AWireHidesAStrip) {
 }
 
 TEST(SoftShadow, BandsNarrowerThanTheConeDoNotNarrowThePenumbra) {
-    const double expected[][2] = {{-1, 0},        {-0.9, 0.0187}, {-0.75, 0.0721}, {-0.5, 0.19550}, {-0.25, 0.34252}, {0, 0.5},
-                                  {0.25, 0.65748}, {0.5, 0.80450}, {0.75, 0.9279},  {0.9, 0.9813},   {1, 1}};
+    const double expected[][2] = {{-1, 0},          {-0.9, 0.0187}, {-0.75, 0.0721}, {-0.5, 0.19550},
+                                  {-0.25, 0.34252}, {0, 0.5},       {0.25, 0.65748}, {0.5, 0.80450},
+                                  {0.75, 0.9279},   {0.9, 0.9813},  {1, 1}};
     for (const float h : {1.0f, 2.5f, 4.0f}) {
         for (const float share : {0.95f, 0.8f, 0.5f, 0.25f, 0.12f}) {  // of the cone's radius where the edge is
             const float band = share * kLightRadius * h / kLightHeight;

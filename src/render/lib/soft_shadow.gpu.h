@@ -41,8 +41,8 @@ struct ShadowMarch {
 // What one ray found. state: 0 stopped, 1 got through, -1 stopped and the whole disc is covered.
 struct ShadowSight {
     int state;
-    float x;    // distance of the nearest silhouette, in radii of the disc, at most 1
-    vec2 away;  // unit, on the disc: away from that silhouette; (0, 0) where x is 1
+    float x;     // distance of the nearest silhouette, in radii of the disc, at most 1
+    vec2 away;   // unit, on the disc: away from that silhouette; (0, 0) where x is 1
     float open;  // along the ray: up to there all of the cone is clear
     float wide;  // the cone's radius, in bands, where it was widest and not all of it known; 0: it always was
 };
@@ -157,7 +157,8 @@ KILN_FN float shadow_visible(vec3 p, vec3 l, float tan_radius, ShadowMarch march
                 side = sight.wide < 2.0f ? 0.65f : side * 0.8f;
             }
             // Three of every second: 120 degrees apart.
-            float turn = float((look - 1) / 2) * (sight.state == 1 && sight.wide < 2.0f ? 2.0f * kPi / 3.0f : kPi / 3.0f);
+            float turn =
+                float((look - 1) / 2) * (sight.state == 1 && sight.wide < 2.0f ? 2.0f * kPi / 3.0f : kPi / 3.0f);
             to = vec2(side * cos(turn), side * sin(turn));
         }
         if (look >= 7 && look < 11) {

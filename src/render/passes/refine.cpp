@@ -46,8 +46,7 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
     for (size_t i = 0; i < pixels; ++i) out[4 * i] = kNotRefined;
     std::vector<uint32_t> asked;  // by brick, so that many points share one piece of code
     for (size_t i = 0; i < pixels; ++i)
-        if (visibility[4 * i + 1] >> 28 == kSeenBrick)
-            asked.push_back(uint32_t(i));
+        if (visibility[4 * i + 1] >> 28 == kSeenBrick) asked.push_back(uint32_t(i));
     const auto slot_of = [&](uint32_t pixel) { return visibility[4 * size_t{pixel} + 1] & 0x0fffffffu; };
     std::stable_sort(asked.begin(), asked.end(), [&](uint32_t a, uint32_t b) { return slot_of(a) < slot_of(b); });
     std::vector<size_t> firsts;
@@ -63,12 +62,11 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
         const size_t first = firsts[size_t(group)];
         const size_t last = size_t(group) + 1 < firsts.size() ? firsts[size_t(group) + 1] : asked.size();
         const std::span<const uint32_t> here(asked.data() + first, last - first);
-        const field::BrickRecord& record = field.records()[slot_of(here[0])];
-        const sdf::TapeView tape =
-            sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count));
+        const sdf::TapeView tape = sdf::view(field.program(), field.code_of(slot_of(here[0])));
         const sdf::Points points{b.x.data(), b.y.data(), b.z.data(), int(here.size())};
         for (size_t k = 0; k < here.size(); ++k) {
-            const int x = int(here[k]) % frame.tile_width + frame.tile_x, y = int(here[k]) / frame.tile_width + frame.tile_y;
+            const int x = int(here[k]) % frame.tile_width + frame.tile_x,
+                      y = int(here[k]) / frame.tile_width + frame.tile_y;
             b.direction[k] = shade::camera_direction_at(frame.camera, float(x) + 0.5f, float(y) + 0.5f);
             b.t_first[k] = b.t[k] = b.t_before[k] = std::bit_cast<float>(visibility[4 * size_t{here[k]}]);
             b.d_before[k] = 0;
@@ -81,7 +79,9 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
                 vec3 p = origin + b.direction[k] * (b.t[k] * h);
                 if (look > 0) {
                     const vec3 at = origin + b.direction[k] * (b.t_first[k] * h);
-                    const float step = side * refine_gradient_step(h, gpu::largest3({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)}));
+                    const float step =
+                        side *
+                        refine_gradient_step(h, gpu::largest3({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)}));
                     (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += step;
                 }
                 b.x[k] = p.x, b.y[k] = p.y, b.z[k] = p.z;
