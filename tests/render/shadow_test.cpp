@@ -86,11 +86,11 @@ double common_area(double r, double s, double d) {
 }
 
 TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
-    // The cone is 2.5, 5 and 17 voxels wide at the edge.
-    for (const float h : {0.5f, 1.0f, 2.0f}) {
-        const float thickness = 0.06f;
+    // The cone is 2.5, 5 and 17 voxels wide at the edge; the last solid has cells without bricks inside.
+    for (const auto& [h, thickness] :
+         {std::pair{0.5f, 0.06f}, std::pair{1.0f, 0.06f}, std::pair{2.0f, 0.06f}, std::pair{2.0f, 0.8f}}) {
         const auto world = slab_with("plate", box({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
-                                     {1.2f, h + 0.2f, 0.9f});
+                                     {1.2f, h + thickness + 0.14f, 0.9f});
         std::vector<float> places;
         std::vector<double> expected;
         // Shadow rays start a voxel above the slab.
