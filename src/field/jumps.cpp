@@ -8,9 +8,6 @@
 #include <array>
 #include <cstring>
 #include <vector>
-#if defined(__SSE2__)
-#include <xmmintrin.h>
-#endif
 
 namespace kiln::field {
 namespace {
@@ -86,11 +83,11 @@ void each_page(const CellMap& cells, const CellBox& box, Fn&& fn) {
 // Bit k is the highest bit of word k, of 8.
 uint32_t top_bits(const uint32_t* words) {
     uint32_t out = 0;
-#if defined(__SSE2__)
+#if defined(__SSE__)
     for (int half = 0; half < 2; ++half) {
-        __m128 four;
+        float four __attribute__((vector_size(16)));
         std::memcpy(&four, words + 4 * half, sizeof four);
-        out |= uint32_t(_mm_movemask_ps(four)) << (4 * half);
+        out |= uint32_t(__builtin_ia32_movmskps(four)) << (4 * half);
     }
 #else
     for (int k = 0; k < kCellPage; ++k) out |= (words[k] >> 31) << k;
