@@ -28,7 +28,8 @@ void report(benchmark::State& state, const field::Field& field, const field::Mes
     double sum = 0, most = 0;
     for (size_t i = 0; i < mesh.vertex_count(); i += 16) {
         const vec3 p = mesh.positions[i];
-        const double d = sdf::evaluate(tape, dvec3{double(p.x), double(p.y), double(p.z)}) / double(field.grid().voxel_size);
+        const double d =
+            sdf::evaluate(tape, dvec3{double(p.x), double(p.y), double(p.z)}) / double(field.grid().voxel_size);
         sum += d * d;
         most = std::max(most, std::abs(d));
     }
@@ -52,6 +53,19 @@ void mesh_smooth(benchmark::State& state) {
     report(state, *field, mesh);
 }
 BENCHMARK(mesh_smooth)->ArgNames({"kind", "keep"})->ArgsProduct({{0, 1, 2}, {0, 1}})->Unit(benchmark::kMillisecond);
+
+void mesh_sharp(benchmark::State& state) {
+    const auto field = field_of(int(state.range(0)));
+    const field::HostBricks host = field::HostBricks::bake(field, 1);
+    field::Mesh mesh;
+    for (auto _ : state) {
+        mesh = {};
+        const field::MeshBricks bricks(host);
+        field::mesh_sharp(bricks, field::exact_of(host, bricks), mesh, 1);
+    }
+    report(state, *field, mesh);
+}
+BENCHMARK(mesh_sharp)->ArgName("kind")->DenseRange(0, 2)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace kiln::bench

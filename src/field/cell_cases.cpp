@@ -80,7 +80,8 @@ public:
         const int k = parts_[i][j].apex;
         emit(i, k, out);
         KILN_ASSERT(out.count < kMostTriangles, "{} triangles", int(out.count));
-        for (const int corner : {i, k, j}) out.edges[3 * out.count + (corner == i ? 0 : corner == k ? 1 : 2)] = edges_[corner];
+        for (const int corner : {i, k, j})
+            out.edges[3 * out.count + (corner == i ? 0 : corner == k ? 1 : 2)] = edges_[corner];
         ++out.count;
         emit(k, j, out);
     }

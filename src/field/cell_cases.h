@@ -18,7 +18,7 @@
 
 namespace kiln::field {
 
-inline constexpr int kMostLoops = 4;       // each has three edges or more, and a voxel twelve
+inline constexpr int kMostLoops = 4;      // each has three edges or more, and a voxel twelve
 inline constexpr int kMostTriangles = 5;  // of any of the 256 voxels with no face flipped
 
 /// The loops of one voxel, edges in order, anticlockwise as seen from the empty side.

@@ -16,7 +16,8 @@ namespace kiln::field {
 
 /// Numbers that are written once: keeps its memory between uses and does not clear it first.
 template <typename T>
-requires std::is_trivially_copyable_v<T> class Buffer {
+requires std::is_trivially_copyable_v<T>
+class Buffer {
 public:
     /// Contents are undefined afterwards.
     void resize(size_t count) {
@@ -44,8 +45,8 @@ private:
 
 struct Mesh {
     Buffer<vec3> positions;
-    Buffer<uint32_t> triangles;     ///< three vertices each
-    Buffer<uint32_t> vertex_brick;  ///< by vertex: its brick in MeshBricks, whose code holds there; only where asked for
+    Buffer<uint32_t> triangles;       ///< three vertices each
+    Buffer<uint32_t> brick_vertices;  ///< brick i of the MeshBricks made vertices [i] … [i + 1] - 1, which lie in it
 
     size_t vertex_count() const { return positions.size(); }
     size_t triangle_count() const { return triangles.size() / 3; }

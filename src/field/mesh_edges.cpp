@@ -4,7 +4,7 @@
 #include "base/parallel_for.h"
 
 #ifdef __SSE2__
-#include <emmintrin.h>
+#include <immintrin.h>
 #endif
 
 namespace kiln::field {
@@ -16,9 +16,7 @@ enum Lower { kX, kXY, kY, kXaboveY, kYZ, kXZ, kZ, kXaboveZ, kYaboveZ };  // kLow
 void solid_texels(const std::byte* codes, DistanceFormat format, std::array<Slice, 8>& out) {
 #ifdef __SSE2__
     const __m128i zero = _mm_setzero_si128();
-    const auto at = [&](int block) {
-        return _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes) + block);
-    };
+    const auto at = [&](int block) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes) + block); };
     for (int z = 0; z < 8; ++z) {
         Slice empty = 0;
         for (int pair = 0; pair < 4; ++pair) {
@@ -63,7 +61,8 @@ MeshEdges::MeshEdges(const MeshBricks& bricks) : bricks_(bricks) { edges_.resize
 
 void MeshEdges::count(int workers, Count items) {
     const std::span<const MeshBricks::Row> rows = bricks_.rows();
-    parallel_for(rows.size(), workers, [&](int i) { count_row(rows[size_t(i)], items); }, kRowGrain);
+    parallel_for(
+        rows.size(), workers, [&](int i) { count_row(rows[size_t(i)], items); }, kRowGrain);
     for (size_t i = 0; i < edges_.size(); ++i) {
         edges_[i].first_edge = edge_count_;
         edges_[i].first_item = item_count_;
@@ -188,7 +187,8 @@ void MeshEdges::number(size_t index, EdgeNumbers& out) const {
                         owner = y == 0 ? kY : kX;
                 }
                 const ivec3 step = kLower[owner];
-                out[first + size_t(bit)] = number_of(n[size_t(owner)], axis, x - 7 * step.x, y - 7 * step.y, z - 7 * step.z);
+                out[first + size_t(bit)] =
+                    number_of(n[size_t(owner)], axis, x - 7 * step.x, y - 7 * step.y, z - 7 * step.z);
             }
         }
     }

@@ -33,8 +33,8 @@ struct BrickEdges {
 };
 
 /// Steps to those neighbours that come before a brick in order and share an edge with it.
-inline constexpr ivec3 kLower[9] = {{-1, 0, 0}, {-1, -1, 0}, {0, -1, 0}, {1, -1, 0}, {0, -1, -1},
-                                    {-1, 0, -1}, {0, 0, -1}, {1, 0, -1}, {0, 1, -1}};
+inline constexpr ivec3 kLower[9] = {{-1, 0, 0},  {-1, -1, 0}, {0, -1, 0}, {1, -1, 0}, {0, -1, -1},
+                                    {-1, 0, -1}, {0, 0, -1},  {1, 0, -1}, {0, 1, -1}};
 
 /// Edges of `solid` along an axis in slice z: bit set where the ends differ.
 inline Slice crossed_edges(const std::array<Slice, 8>& solid, int axis, int z) {

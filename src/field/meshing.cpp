@@ -121,7 +121,9 @@ void mesh_smooth(const MeshBricks& bricks, Mesh& out, int workers) {
     });
     out.positions.resize(edges.edge_count());
     out.triangles.resize(3 * size_t(edges.item_count()));
-    out.vertex_brick.resize(0);
+    out.brick_vertices.resize(bricks.bricks().size() + 1);
+    for (size_t i = 0; i < bricks.bricks().size(); ++i) out.brick_vertices[i] = edges[i].first_edge;
+    out.brick_vertices[bricks.bricks().size()] = edges.edge_count();
     Smooth smooth(edges, out);
     parallel_for(
         bricks.rows().size(), workers,

@@ -15,4 +15,16 @@ namespace kiln::field {
 /// texels and its place, so two regions that share a face have the same vertices on it, bit for bit.
 void mesh_smooth(const MeshBricks& bricks, Mesh& out, int workers = 0);
 
+/// out[i] = the exact field at point i, metres, for points of a brick. Called from many threads.
+using ExactBrick = std::function<void(size_t brick, const sdf::Points& points, float* out)>;
+/// Of the bricks' own code. `bricks` must be of `host`, and both outlive it.
+ExactBrick exact_of(const HostBricks& host, const MeshBricks& bricks);
+
+/// Dual: a vertex in each voxel for each sheet of the surface there (Nielson, "Dual Marching Cubes", 2004), where the planes of the
+/// surface at the voxel's crossed edges meet (Ju, Losasso, Schaefer and Warren, "Dual Contouring of Hermite Data", 2002), so
+/// edges and corners of shapes stay sharp. A vertex never leaves its voxel, and lies within kSharpTolerance of the surface or on
+/// one of the edge crossings.
+void mesh_sharp(const MeshBricks& bricks, const ExactBrick& exact, Mesh& out, int workers = 0);
+inline constexpr float kSharpTolerance = 0.1f;  // voxels
+
 }  // namespace kiln::field

@@ -71,7 +71,8 @@ TEST(CellCases, LoopsHoldEachCrossedEdgeOnceAndNoOther) {
             for (int edge = 0; edge < 12; ++edge) {
                 const int axis = edge / 4, u = axis == 0 ? 1 : 0, v = axis == 2 ? 1 : 2;
                 const int a = (edge & 1) << u | (edge >> 1 & 1) << v, b = a | 1 << axis;
-                EXPECT_EQ(seen.count(edge), (solid >> a & 1u) != (solid >> b & 1u) ? 1u : 0u) << solid << " edge " << edge;
+                EXPECT_EQ(seen.count(edge), (solid >> a & 1u) != (solid >> b & 1u) ? 1u : 0u)
+                    << solid << " edge " << edge;
             }
         }
     }

@@ -49,7 +49,8 @@ inline MadeUp noise(int cells, uint32_t seed, DistanceFormat format = DistanceFo
     const auto value = [=](ivec3 p) {
         const int end = 7 * cells;
         if (p.x <= 0 || p.y <= 0 || p.z <= 0 || p.x >= end || p.y >= end || p.z >= end) return 1.0f;
-        uint32_t h = seed * 0x9e3779b9u + uint32_t(p.x) * 73856093u + uint32_t(p.y) * 19349663u + uint32_t(p.z) * 83492791u;
+        uint32_t h =
+            seed * 0x9e3779b9u + uint32_t(p.x) * 73856093u + uint32_t(p.y) * 19349663u + uint32_t(p.z) * 83492791u;
         h = (h ^ h >> 16) * 0x7feb352du;
         h = (h ^ h >> 15) * 0x846ca68bu;
         h ^= h >> 16;
@@ -65,7 +66,8 @@ inline size_t pinched_vertices(const Mesh& mesh) {
     std::vector<std::vector<std::pair<uint32_t, uint32_t>>> spokes(mesh.vertex_count());
     for (size_t t = 0; t < mesh.triangles.size(); t += 3) {
         for (size_t i = 0; i < 3; ++i) {
-            spokes[mesh.triangles[t + i]].emplace_back(mesh.triangles[t + (i + 1) % 3], mesh.triangles[t + (i + 2) % 3]);
+            spokes[mesh.triangles[t + i]].emplace_back(mesh.triangles[t + (i + 1) % 3],
+                                                       mesh.triangles[t + (i + 2) % 3]);
         }
     }
     size_t out = 0;

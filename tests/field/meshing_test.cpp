@@ -24,6 +24,34 @@ Mesh smooth_of(const worlds::World& world, int workers = 0) {
     return out;
 }
 
+Mesh sharp_of(const HostBricks& host, int workers = 0) {
+    const MeshBricks bricks(host);
+    Mesh out;
+    mesh_sharp(bricks, exact_of(host, bricks), out, workers);
+    return out;
+}
+
+Mesh sharp_of(const worlds::World& world, int workers = 0) {
+    return sharp_of(HostBricks::bake(world.field(), workers), workers);
+}
+
+// Worst and root mean square distance of vertices from the exact surface, voxels.
+struct Off {
+    double most = 0, rms = 0;
+};
+Off off(const Mesh& mesh, const Field& field) {
+    const sdf::TapeView tape = sdf::view(field.program());
+    Off out;
+    for (const vec3 p : mesh.positions.span()) {
+        const double d = std::abs(sdf::evaluate(tape, dvec3{double(p.x), double(p.y), double(p.z)})) /
+                         double(field.grid().voxel_size);
+        out.most = std::max(out.most, d);
+        out.rms += d * d;
+    }
+    out.rms = std::sqrt(out.rms / double(mesh.vertex_count()));
+    return out;
+}
+
 std::vector<std::byte> bytes_of(const Mesh& mesh) {
     std::vector<std::byte> out;
     const auto append = [&](auto span) {
@@ -125,7 +153,92 @@ TEST(Meshing, RegionsHaveEqualVerticesOnTheirCommonFaceAndTogetherAreTheWhole) {
 
 TEST(Meshing, SameBytesForAnyNumberOfWorkers) {
     const auto one = bytes_of(smooth_of(worlds::jumble(11, 60), 1));
-    for (const int workers : {2, 3, 8}) EXPECT_EQ(bytes_of(smooth_of(worlds::jumble(11, 60), workers)), one) << workers;
+    const auto sharp = bytes_of(sharp_of(worlds::jumble(11, 60), 1));
+    for (const int workers : {2, 3, 8}) {
+        EXPECT_EQ(bytes_of(smooth_of(worlds::jumble(11, 60), workers)), one) << workers;
+        EXPECT_EQ(bytes_of(sharp_of(worlds::jumble(11, 60), workers)), sharp) << workers;
+    }
+}
+
+TEST(Meshing, SharpWorldsAreClosedManifoldsAndTheirVerticesAreOnTheSurface) {
+    std::vector<worlds::World> all = worlds::all();
+    all.push_back(waves());
+    for (uint32_t seed = 20; seed < 26; ++seed) all.push_back(worlds::jumble(seed, 80));
+    for (const worlds::World& world : all) {
+        const auto field = world.field();
+        const Mesh mesh = sharp_of(HostBricks::bake(field));
+        expect_closed(mesh, world.name);
+        const Off d = off(mesh, *field);
+        EXPECT_LE(d.most, 0.5) << world.name;
+        EXPECT_LE(d.rms, 0.025) << world.name;
+    }
+}
+
+TEST(Meshing, SharpRandomSignsAreClosedManifolds) {
+    for (const uint32_t seed : {3u, 4u, 5u}) {
+        const meshes::MadeUp noise = meshes::noise(4, seed);
+        const MeshBricks bricks = noise.view();
+        Mesh mesh;
+        // A field that knows nothing of the bricks: vertices land anywhere in their voxels.
+        mesh_sharp(
+            bricks,
+            [](size_t, const sdf::Points& p, float* to) {
+                for (int i = 0; i < p.count; ++i) to[i] = std::sin(90 * p.x[i]) * std::cos(70 * p.y[i] + p.z[i]) * 0.1f;
+            },
+            mesh);
+        expect_closed(mesh, "noise");
+    }
+}
+
+// A corner is found where the voxel that holds it has a crossing with each of its three faces; where one face misses all
+// twelve edges the vertex still lies on the other two.
+TEST(Meshing, SharpKeepsTheCornersAndVolumeOfTurnedBoxes) {
+    constexpr int kBoxes = 40;
+    int found = 0;
+    worlds::Random random(5);
+    for (int i = 0; i < kBoxes; ++i) {
+        worlds::World box{"box", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}}};
+        const vec3 half{0.7f, 0.5f, 0.6f};
+        box.edits.push_back(worlds::edit(Box{.half_extents = half}, random.point(0.05f)));
+        Transform& place = box.edits[0].node.transform;
+        place.rotation = axis_angle(random.direction(), random.in(-3, 3));
+        const Mesh mesh = sharp_of(box);
+        const double volume = 8 * 0.7 * 0.5 * 0.6, area = 8 * (0.7 * 0.5 + 0.5 * 0.6 + 0.6 * 0.7);
+        EXPECT_NEAR(facts(mesh).volume, volume, 1e-3 * volume);
+        EXPECT_NEAR(facts(mesh).area, area, 4e-3 * area);
+        for (int corner = 0; corner < 8; ++corner) {
+            const vec3 local{corner & 1 ? half.x : -half.x, corner & 2 ? half.y : -half.y,
+                             corner & 4 ? half.z : -half.z};
+            const vec3 p = rotate(place.rotation, local) + place.position;
+            float nearest = 1;
+            for (const vec3 v : mesh.positions.span()) nearest = std::min(nearest, length(v - p));
+            EXPECT_LT(nearest / box.options.voxel_size, std::numbers::sqrt3_v<float>) << "not in its own voxel";
+            found += nearest / box.options.voxel_size < 0.05f;
+        }
+    }
+    EXPECT_GT(found, kBoxes * 8 / 2);
+    RecordProperty("found", found);
+}
+
+TEST(Meshing, SharpVerticesStayInTheirVoxels) {
+    const HostBricks host = HostBricks::bake(worlds::jumble(11, 60).field());
+    const MeshBricks bricks(host);
+    Mesh mesh;
+    mesh_sharp(bricks, exact_of(host, bricks), mesh);
+    const float h = bricks.voxel_size();
+    for (size_t brick = 0; brick < bricks.bricks().size(); ++brick) {
+        for (uint32_t v = mesh.brick_vertices[brick]; v < mesh.brick_vertices[brick + 1]; ++v) {
+            // Its voxel is active: a corner on each side.
+            const vec3 p = mesh.positions[v] / h;
+            const ivec3 cell = bricks.bricks()[brick].cell;
+            const ivec3 voxel{int(std::floor(p.x)) - 7 * cell.x, int(std::floor(p.y)) - 7 * cell.y,
+                              int(std::floor(p.z)) - 7 * cell.z};
+            ASSERT_TRUE(voxel.x >= 0 && voxel.y >= 0 && voxel.z >= 0 && voxel.x < 7 && voxel.y < 7 && voxel.z < 7);
+            const Corners c = host.corners(bricks.bricks()[brick].slot, voxel);
+            const auto [low, high] = std::minmax({c.v000, c.v100, c.v010, c.v110, c.v001, c.v101, c.v011, c.v111});
+            ASSERT_TRUE(low <= 0 && high > 0) << "vertex " << v;
+        }
+    }
 }
 
 TEST(Meshing, EulerCharacteristicOfSphereAndTorus) {
