@@ -29,13 +29,32 @@ struct Crossing {
 };
 
 constexpr int kRootSteps = 8;
-constexpr float kRootTolerance = 1e-3f;      // voxels
-constexpr float kGradientStep = 1.0f / 32;   // voxels; a float's rounding at 1000 voxels is 6e-5
+constexpr float kRootTolerance = 1e-3f;       // voxels
+constexpr float kNewtonReach = 0.1f;          // voxels off the surface from which one step by the gradient lands on it
+constexpr float kGradientStep = 1.0f / 32;    // voxels; a float's rounding at 1000 voxels is 6e-5
 constexpr float kLeastFraction = 1.0f / 256;  // vertices stay this far inside their voxel: no two share a position
-constexpr float kStill = 0.005f;             // voxels off the surface that need no second look
+constexpr float kStill = 0.005f;              // voxels off the surface that need no second look
 // Of the squared distances to the planes, how much is added for the distance to their middle: planes that agree leave a vertex
 // there, planes that differ by more than about 10 degrees meet where they should.
 constexpr float kMiddleWeight = 0.004f;
+
+typedef float float4 __attribute__((vector_size(16)));
+float4 all_of(float v) { return float4{v, v, v, v}; }
+
+// A crossing's place in its voxel, from the middle of the voxel: origin + t * along.
+struct EdgePlace {
+    float4 origin, along;
+};
+constexpr std::array<EdgePlace, 12> kEdgePlace = [] {
+    std::array<EdgePlace, 12> out{};
+    for (int e = 0; e < 12; ++e) {
+        const float u = (e & 1) != 0 ? 0.5f : -0.5f, v = (e & 2) != 0 ? 0.5f : -0.5f;
+        if (e / 4 == 0) out[size_t(e)] = {float4{-0.5f, u, v, 0}, float4{1, 0, 0, 0}};
+        if (e / 4 == 1) out[size_t(e)] = {float4{u, -0.5f, v, 0}, float4{0, 1, 0, 0}};
+        if (e / 4 == 2) out[size_t(e)] = {float4{u, v, -0.5f, 0}, float4{0, 0, 1, 0}};
+    }
+    return out;
+}();
 
 // The voxel across a face.
 struct Voxel {
@@ -152,25 +171,35 @@ private:
 // Points for one call of `exact`, and what it answered.
 struct Batch {
     std::vector<float> x, y, z, value;
-    void clear() { x.clear(), y.clear(), z.clear(); }
-    void add(float px, float py, float pz) { x.push_back(px), y.push_back(py), z.push_back(pz); }
-    void run(const ExactBrick& exact, size_t brick) {
-        value.resize(x.size());
-        if (!x.empty()) exact(brick, {x.data(), y.data(), z.data(), int(x.size())}, value.data());
+    size_t count = 0;
+    void reserve(size_t most) {
+        if (x.size() >= most) return;
+        for (std::vector<float>* v : {&x, &y, &z, &value}) v->resize(most);
     }
+    void add(vec3 p) {
+        x[count] = p.x, y[count] = p.y, z[count] = p.z;
+        ++count;
+    }
+    void run(const ExactBrick& exact, size_t brick) {
+        if (count != 0) exact(brick, {x.data(), y.data(), z.data(), int(count)}, value.data());
+    }
+};
+
+// One sheet of the surface in a voxel.
+struct Sheet {
+    vec3 at;      // from the voxel's first corner
+    vec3 normal;  // unit: the middle one of its crossings
+    float off;    // of the exact field there, voxels
+    uint16_t voxel;
+    uint8_t loop;
 };
 
 struct Scratch {
     Batch batch;
-    // By owned edge.
-    std::vector<ivec3> texel;
-    std::vector<float> low_t, high_t, low_value, high_value, t;
-    std::vector<int8_t> kept_side;
+    // By owned edge: its first texel, the position along it, the values at its ends, and what is left to find.
+    std::vector<float> x, y, z, t, low, high;
     std::vector<uint32_t> open;
-    // By vertex.
-    std::vector<ivec3> voxel;
-    std::vector<vec3> at, normal, fallback, middle;
-    std::vector<float> off;
+    std::vector<Sheet> sheets;
 };
 
 class Sharp {
@@ -186,38 +215,55 @@ public:
           h_(edges.bricks().voxel_size()),
           per_voxel_(1 / h_) {}
 
-    // Crossings of the edges that a brick owns.
+    // Crossings of the edges that a brick owns: tangent planes of the exact field where the stored values vanish, moved to the root by
+    // one Newton step; by false position where the field bends too much for that.
     void cross(size_t index, Scratch& s) const {
         const BrickEdges& edges = edges_[index];
         if (!edges.crossed || edges.edges == 0) return;
         const MeshBrick& brick = edges_.bricks().bricks()[index];
         const size_t count = edges.edges;
-        s.texel.resize(count);
-        s.low_t.assign(count, 0.0f);
-        s.high_t.assign(count, 1.0f);
-        s.low_value.resize(count);
-        s.high_value.resize(count);
-        s.t.resize(count);
-        s.kept_side.assign(count, 0);
-        s.open.resize(count);
-        std::vector<uint8_t>& axes = axes_of(edges);
+        for (std::vector<float>* v : {&s.x, &s.y, &s.z, &s.t, &s.low, &s.high})
+            if (v->size() < count) v->resize(count);
+        s.batch.reserve(6 * count);
+        s.open.clear();
+        size_t first[4] = {0, edges.rank[8], edges.rank[16], count};
         size_t e = 0;
         for (int axis = 0; axis < 3; ++axis) {
             const int step = axis == 0 ? 1 : axis == 1 ? 8 : 64;
             for (int z = 0; z < 8; ++z) {
                 for (Slice left = edges.owned[size_t(axis * 8 + z)]; left != 0; left &= left - 1, ++e) {
                     const int bit = std::countr_zero(left);
-                    s.texel[e] = {brick.cell.x * kBrickVoxels + (bit & 7), brick.cell.y * kBrickVoxels + (bit >> 3),
-                                  brick.cell.z * kBrickVoxels + z};
-                    s.low_value[e] = stored_voxels(brick.codes, edges_.bricks().format(), z * 64 + bit);
-                    s.high_value[e] = stored_voxels(brick.codes, edges_.bricks().format(), z * 64 + bit + step);
-                    s.open[e] = uint32_t(e);
-                    axes[e] = uint8_t(axis);
+                    s.x[e] = float(brick.cell.x * kBrickVoxels + (bit & 7));
+                    s.y[e] = float(brick.cell.y * kBrickVoxels + (bit >> 3));
+                    s.z[e] = float(brick.cell.z * kBrickVoxels + z);
+                    s.low[e] = stored_voxels(brick.codes, edges_.bricks().format(), z * 64 + bit);
+                    s.high[e] = stored_voxels(brick.codes, edges_.bricks().format(), z * 64 + bit + step);
                 }
             }
         }
-        find_roots(index, s, axes);
-        find_normals(index, s, axes, crossings_.data() + edges.first_edge);
+        for (size_t i = 0; i < count; ++i) s.t[i] = fraction(s.low[i] / (s.low[i] - s.high[i]));
+        Crossing* const to = crossings_.data() + edges.first_edge;
+        for (int axis = 0; axis < 3; ++axis) add_differences(axis, first[axis], first[axis + 1], count, s);
+        s.batch.count = 6 * count;
+        s.batch.run(exact_, index);
+        const float* const v = s.batch.value.data();
+        const float scale = per_voxel_ / (2 * kGradientStep);
+        for (int axis = 0; axis < 3; ++axis) {
+            for (size_t i = first[axis]; i < first[size_t(axis) + 1]; ++i) {
+                const float d[6] = {v[i], v[count + i], v[2 * count + i], v[3 * count + i], v[4 * count + i], v[5 * count + i]};
+                const vec3 g{(d[0] - d[1]) * scale, (d[2] - d[3]) * scale, (d[4] - d[5]) * scale};
+                const float value = (d[2 * axis] + d[2 * axis + 1]) * 0.5f * per_voxel_;
+                const float slope = axis == 0 ? g.x : axis == 1 ? g.y : g.z;
+                const float size = length(g);
+                const float step = value / slope;
+                if (!(std::fabs(value) < kNewtonReach && std::fabs(step) < kNewtonReach && size > 0.01f)) {
+                    s.open.push_back(uint32_t(i));
+                    continue;
+                }
+                to[i] = {g / size, fraction(s.t[i] - step)};
+            }
+        }
+        if (!s.open.empty()) cross_hard(index, first, s, to);
     }
 
     // Vertices of a brick's voxels, and the quads' corners.
@@ -226,32 +272,30 @@ public:
         if (!edges.crossed) return;
         EdgeNumbers numbers;
         edges_.number(index, numbers);
-        const MeshBrick& brick = edges_.bricks().bricks()[index];
-        const uint32_t first = out_.brick_vertices[index];
-        s.voxel.clear(), s.at.clear(), s.normal.clear(), s.fallback.clear(), s.middle.clear();
+        const uint32_t first = out_.brick_vertices[index], count = out_.brick_vertices[index + 1] - first;
+        s.sheets.resize(count);
+        s.batch.reserve(count);
+        uint32_t made = 0;
         for (int z = 0; z < kBrickVoxels; ++z) {
             for (Slice left = active_voxels(edges.solid, z); left != 0; left &= left - 1) {
                 const int bit = std::countr_zero(left);
-                const uint32_t signs = corner_signs(edges.solid, z, bit);
-                const uint32_t flipped = flips_.at(index, z, bit);
-                CellLoops other;
-                if (flipped != 0) other = cell_loops(signs, flipped);
-                const CellLoops& loops = flipped != 0 ? other : cell_tables().loops[signs];
+                CellLoops flipped;
+                const CellLoops& loops = loops_of(index, z * 64 + bit, flipped);
                 const uint32_t* const from = numbers.data() + z * 64 + bit;
-                for (int loop = 0; loop < loops.count; ++loop) {
+                for (int loop = 0; loop < loops.count; ++loop, ++made) {
                     const uint8_t* const begin = loops.edges + loops.first[loop];
                     const uint8_t* const end = loops.edges + loops.first[loop + 1];
-                    const uint32_t vertex = first + uint32_t(s.at.size());
+                    Sheet& sheet = s.sheets[made];
+                    sheet.voxel = uint16_t(z * 64 + bit);
+                    sheet.loop = uint8_t(loop);
                     for (const uint8_t* edge = begin; edge != end; ++edge)
-                        around_[4 * size_t(from[kEdgeOffset[*edge]]) + (*edge & 3u)] = vertex;
-                    s.voxel.push_back({brick.cell.x * kBrickVoxels + (bit & 7),
-                                       brick.cell.y * kBrickVoxels + (bit >> 3), brick.cell.z * kBrickVoxels + z});
-                    meet(begin, end, from, s);
+                        around_[4 * size_t(from[kEdgeOffset[*edge]]) + (*edge & 3u)] = first + made;
+                    meet(begin, end, from, sheet);
                 }
             }
         }
-        settle(index, s);
-        for (size_t i = 0; i < s.at.size(); ++i) out_.positions[first + i] = world(s.voxel[i], s.at[i]);
+        settle(index, numbers, s);
+        for (size_t i = 0; i < count; ++i) out_.positions[first + i] = world(index, s.sheets[i].voxel, s.sheets[i].at);
     }
 
     // Edges of the brick with all four voxels around them.
@@ -264,7 +308,6 @@ public:
     void write_quads(size_t index, uint32_t* to) const {
         const BrickEdges& edges = edges_[index];
         if (!edges.crossed) return;
-        const ivec3 cell = edges_.bricks().bricks()[index].cell;
         uint32_t e = edges.first_edge;
         for (int axis = 0; axis < 3; ++axis) {
             for (int z = 0; z < 8; ++z) {
@@ -276,9 +319,7 @@ public:
                     const uint32_t* const q = around_.data() + 4 * size_t(e);
                     const bool forward = low_is_solid != (axis == 1);
                     const uint32_t ring[4] = {q[0], forward ? q[1] : q[2], q[3], forward ? q[2] : q[1]};
-                    const ivec3 texel{cell.x * kBrickVoxels + (bit & 7), cell.y * kBrickVoxels + (bit >> 3),
-                                      cell.z * kBrickVoxels + z};
-                    const int first = diagonal(ring, texel, axis, crossings_[e]);
+                    const int first = diagonal(ring, world(index, z * 64 + bit, on_edge(axis, crossings_[e].t)), crossings_[e]);
                     for (const int corner : {0, 1, 2, 0, 2, 3}) *to++ = ring[(first + corner) & 3];
                 }
             }
@@ -292,167 +333,205 @@ private:
         std::memcpy(&code, codes + 2 * texel, 2);
         return half_value(code);
     }
-    static std::vector<uint8_t>& axes_of(const BrickEdges& edges) {
-        thread_local std::vector<uint8_t> axes;
-        axes.resize(edges.edges);
-        return axes;
-    }
-    vec3 world(ivec3 texel, vec3 p) const {
-        return {(float(texel.x) + p.x) * h_, (float(texel.y) + p.y) * h_, (float(texel.z) + p.z) * h_};
-    }
+    static float fraction(float t) { return std::min(std::max(t, kLeastFraction), 1 - kLeastFraction); }
     static vec3 on_edge(int axis, float t) { return {axis == 0 ? t : 0, axis == 1 ? t : 0, axis == 2 ? t : 0}; }
+    vec3 world(vec3 texel, vec3 p) const {
+        return {(texel.x + p.x) * h_, (texel.y + p.y) * h_, (texel.z + p.z) * h_};
+    }
+    vec3 world(size_t brick, int texel, vec3 p) const {
+        const ivec3 cell = edges_.bricks().bricks()[brick].cell;
+        return world(vec3{float(cell.x * kBrickVoxels + (texel & 7)), float(cell.y * kBrickVoxels + (texel >> 3 & 7)),
+                          float(cell.z * kBrickVoxels + (texel >> 6))},
+                     p);
+    }
     bool whole(uint32_t e) const {
         const uint32_t* const q = around_.data() + 4 * size_t(e);
         return q[0] != kNothing && q[1] != kNothing && q[2] != kNothing && q[3] != kNothing;
     }
 
-    // False position with the Illinois rule (Dowell and Jarratt, 1971): the ends' signs are those of the texels.
-    void find_roots(size_t index, Scratch& s, const std::vector<uint8_t>& axes) const {
-        for (int step = 0; step < kRootSteps && !s.open.empty(); ++step) {
-            s.batch.clear();
-            for (const uint32_t e : s.open) {
-                const float a = s.low_value[e], b = s.high_value[e];
-                float share = a / (a - b);
-                if (!(share > 0.0f && share < 1.0f)) share = 0.5f;
-                const float t = s.low_t[e] + (s.high_t[e] - s.low_t[e]) * share;
-                s.t[e] = std::min(std::max(t, kLeastFraction), 1 - kLeastFraction);
-                const vec3 p = world(s.texel[e], on_edge(axes[e], s.t[e]));
-                s.batch.add(p.x, p.y, p.z);
+    // Six points around each of the edges first … end - 1 of one axis, in six runs of `count`.
+    void add_differences(int axis, size_t first, size_t end, size_t count, Scratch& s) const {
+        const vec3 unit = on_edge(axis, 1);
+        for (size_t i = 0; i < 6; ++i) {
+            const vec3 step = on_edge(int(i / 2), i % 2 == 0 ? kGradientStep : -kGradientStep);
+            float* const x = s.batch.x.data() + i * count;
+            float* const y = s.batch.y.data() + i * count;
+            float* const z = s.batch.z.data() + i * count;
+            for (size_t e = first; e < end; ++e) x[e] = (s.x[e] + (s.t[e] * unit.x + step.x)) * h_;
+            for (size_t e = first; e < end; ++e) y[e] = (s.y[e] + (s.t[e] * unit.y + step.y)) * h_;
+            for (size_t e = first; e < end; ++e) z[e] = (s.z[e] + (s.t[e] * unit.z + step.z)) * h_;
+        }
+    }
+
+    // The edges in s.open by false position with the Illinois rule (Dowell and Jarratt, 1971), whose ends have the texels' signs,
+    // then their gradients.
+    void cross_hard(size_t index, const size_t (&first)[4], Scratch& s, Crossing* to) const {
+        struct Bracket {
+            uint32_t edge;
+            int axis, kept = 0;
+            float low_t = 0, high_t = 1, low, high;
+        };
+        std::vector<Bracket> all, open;
+        for (const uint32_t e : s.open) all.push_back({e, e < first[1] ? 0 : e < first[2] ? 1 : 2, 0, 0, 1, s.low[e], s.high[e]});
+        const auto texel = [&](uint32_t e) { return vec3{s.x[e], s.y[e], s.z[e]}; };
+        open = all;
+        for (int step = 0; step < kRootSteps && !open.empty(); ++step) {
+            s.batch.count = 0;
+            for (const Bracket& b : open) {
+                const float share = b.low / (b.low - b.high);
+                s.t[b.edge] = fraction(b.low_t + (b.high_t - b.low_t) * (share > 0 && share < 1 ? share : 0.5f));
+                s.batch.add(world(texel(b.edge), on_edge(b.axis, s.t[b.edge])));
             }
             s.batch.run(exact_, index);
             size_t kept = 0;
-            for (size_t i = 0; i < s.open.size(); ++i) {
-                const uint32_t e = s.open[i];
-                const float value = s.batch.value[i] * per_voxel_;
-                if (std::fabs(value) <= kRootTolerance || s.t[e] == kLeastFraction || s.t[e] == 1 - kLeastFraction) {
-                    if (std::fabs(value) <= kRootTolerance || step > 0) continue;
-                }
-                const bool low_side = (value <= 0) == (s.low_value[e] <= 0);
-                if (low_side) {
-                    s.low_t[e] = s.t[e];
-                    s.low_value[e] = value;
-                    if (s.kept_side[e] == 1) s.high_value[e] *= 0.5f;
+            for (size_t i = 0; i < open.size(); ++i) {
+                Bracket b = open[i];
+                const float value = s.batch.value[i] * per_voxel_, t = s.t[b.edge];
+                if (std::fabs(value) <= kRootTolerance) continue;
+                if ((value <= 0) == (b.low <= 0)) {
+                    b.low_t = t;
+                    b.low = value;
+                    if (b.kept == 1) b.high *= 0.5f;
+                    b.kept = 1;
                 } else {
-                    s.high_t[e] = s.t[e];
-                    s.high_value[e] = value;
-                    if (s.kept_side[e] == -1) s.low_value[e] *= 0.5f;
+                    b.high_t = t;
+                    b.high = value;
+                    if (b.kept == -1) b.low *= 0.5f;
+                    b.kept = -1;
                 }
-                s.kept_side[e] = low_side ? int8_t(1) : int8_t(-1);
-                s.open[kept++] = e;
+                open[kept++] = b;
             }
-            s.open.resize(kept);
+            open.resize(kept);
         }
-    }
-
-    // Central differences of the exact field.
-    void find_normals(size_t index, Scratch& s, const std::vector<uint8_t>& axes, Crossing* to) const {
-        s.batch.clear();
-        for (size_t e = 0; e < s.t.size(); ++e) {
-            const vec3 p = on_edge(axes[e], s.t[e]);
+        s.batch.count = 0;
+        for (const Bracket& b : all) {
             for (int axis = 0; axis < 3; ++axis) {
-                for (const float step : {kGradientStep, -kGradientStep}) {
-                    const vec3 q = world(s.texel[e], p + on_edge(axis, step));
-                    s.batch.add(q.x, q.y, q.z);
-                }
+                for (const float step : {kGradientStep, -kGradientStep})
+                    s.batch.add(world(texel(b.edge), on_edge(b.axis, s.t[b.edge]) + on_edge(axis, step)));
             }
         }
         s.batch.run(exact_, index);
-        for (size_t e = 0; e < s.t.size(); ++e) {
-            const float* const v = s.batch.value.data() + 6 * e;
+        for (size_t i = 0; i < all.size(); ++i) {
+            const float* const v = s.batch.value.data() + 6 * i;
             const vec3 g{v[0] - v[1], v[2] - v[3], v[4] - v[5]};
             const float size = length(g);
-            to[e] = {size > 1e-3f * kGradientStep * h_ ? g / size : vec3{}, s.t[e]};
+            to[all[i].edge] = {size > 1e-3f * kGradientStep * h_ ? g / size : vec3{}, s.t[all[i].edge]};
         }
     }
 
-    // Where the planes of one loop meet, near the middle of its crossings.
-    void meet(const uint8_t* begin, const uint8_t* end, const uint32_t* from, Scratch& s) const {
-        vec3 points[12], middle{}, normal{};
-        int count = 0;
-        for (const uint8_t* edge = begin; edge != end; ++edge, ++count) {
-            const Crossing& c = crossings_[from[kEdgeOffset[*edge]]];
-            const int axis = *edge / 4;
-            const float u = float(*edge & 1), v = float(*edge >> 1 & 1);
-            points[count] = axis == 0 ? vec3{c.t, u, v} : axis == 1 ? vec3{u, c.t, v} : vec3{u, v, c.t};
-            middle = middle + points[count];
-            normal = normal + c.normal;
+    const CellLoops& loops_of(size_t index, int voxel, CellLoops& flipped) const {
+        const uint32_t signs = corner_signs(edges_[index].solid, voxel >> 6, voxel & 63);
+        const uint32_t faces = flips_.at(index, voxel >> 6, voxel & 63);
+        if (faces == 0) return cell_tables().loops[signs];
+        flipped = cell_loops(signs, faces);
+        return flipped;
+    }
+
+    // Where the planes of one loop meet, near the middle of its crossings: least squares, by Cramer's rule.
+    void meet(const uint8_t* begin, const uint8_t* end, const uint32_t* from, Sheet& sheet) const {
+        float4 middle{}, normal{}, right{}, row_x{}, row_y{}, row_z{};
+        for (const uint8_t* edge = begin; edge != end; ++edge) {
+            float4 n;
+            std::memcpy(&n, &crossings_[from[kEdgeOffset[*edge]]], sizeof n);
+            const EdgePlace& place = kEdgePlace[*edge];
+            const float4 p = place.origin + place.along * all_of(n[3]);
+            middle += p;
+            normal += n;
+            row_x += n * all_of(n[0]);
+            row_y += n * all_of(n[1]);
+            row_z += n * all_of(n[2]);
+            const float4 product = n * p;
+            right += n * all_of(product[0] + product[1] + product[2]);
         }
-        middle = middle / float(count);
-        float xx = kMiddleWeight * float(count), yy = xx, zz = xx, xy = 0, xz = 0, yz = 0;
-        vec3 right{};
-        count = 0;
-        for (const uint8_t* edge = begin; edge != end; ++edge, ++count) {
-            const vec3 n = crossings_[from[kEdgeOffset[*edge]]].normal;
-            xx += n.x * n.x, yy += n.y * n.y, zz += n.z * n.z;
-            xy += n.x * n.y, xz += n.x * n.z, yz += n.y * n.z;
-            right = right + n * dot(n, points[count] - middle);
-        }
-        // Cramer's rule: the weight keeps the determinant above 0.
+        const float count = float(end - begin);
+        middle *= all_of(1 / count);
+        right -= row_x * all_of(middle[0]) + row_y * all_of(middle[1]) + row_z * all_of(middle[2]);
+        const float weight = kMiddleWeight * count;  // keeps the determinant above 0
+        const float xx = row_x[0] + weight, yy = row_y[1] + weight, zz = row_z[2] + weight;
+        const float xy = row_x[1], xz = row_x[2], yz = row_y[2];
         const float c_xx = yy * zz - yz * yz, c_xy = xz * yz - xy * zz, c_xz = xy * yz - xz * yy;
         const float c_yy = xx * zz - xz * xz, c_yz = xy * xz - xx * yz, c_zz = xx * yy - xy * xy;
         const float scale = 1 / (xx * c_xx + xy * c_xy + xz * c_xz);
-        const vec3 step{scale * (c_xx * right.x + c_xy * right.y + c_xz * right.z),
-                        scale * (c_xy * right.x + c_yy * right.y + c_yz * right.z),
-                        scale * (c_xz * right.x + c_yz * right.y + c_zz * right.z)};
-        const float size = length(normal);
-        s.at.push_back(inside(middle + step));
-        s.normal.push_back(size > 0 ? normal / size : vec3{});
-        s.middle.push_back(inside(middle));
+        const float4 column_x{c_xx, c_xy, c_xz, 0}, column_y{c_xy, c_yy, c_yz, 0}, column_z{c_xz, c_yz, c_zz, 0};
+        const float4 at = middle + (column_x * all_of(right[0]) + column_y * all_of(right[1]) + column_z * all_of(right[2])) *
+                                       all_of(scale);
+        sheet.at = inside({at[0] + 0.5f, at[1] + 0.5f, at[2] + 0.5f});
+        const vec3 n{normal[0], normal[1], normal[2]};
+        const float size = length(n);
+        sheet.normal = size > 0 ? n / size : vec3{};
+    }
+    static vec3 inside(vec3 p) { return {fraction(p.x), fraction(p.y), fraction(p.z)}; }
+
+    // Points that lie on the sheet or near it whatever its planes do.
+    struct Safe {
+        vec3 middle, crossing;  // of the crossings, and the one nearest to it
+    };
+    Safe safe(size_t index, const EdgeNumbers& numbers, const Sheet& sheet) const {
+        CellLoops flipped;
+        const CellLoops& loops = loops_of(index, sheet.voxel, flipped);
+        vec3 points[12], middle{};
+        int count = 0;
+        for (int i = loops.first[sheet.loop]; i < loops.first[sheet.loop + 1]; ++i) {
+            const EdgePlace& place = kEdgePlace[loops.edges[i]];
+            const float4 p = place.origin + place.along * all_of(crossings_[numbers[sheet.voxel + kEdgeOffset[loops.edges[i]]]].t);
+            points[count] = {p[0] + 0.5f, p[1] + 0.5f, p[2] + 0.5f};
+            middle = middle + points[count++];
+        }
+        middle = middle / float(count);
         vec3 nearest = points[0];
         for (int i = 1; i < count; ++i) {
             const vec3 a = points[i] - middle, b = nearest - middle;
             if (dot(a, a) < dot(b, b)) nearest = points[i];
         }
-        s.fallback.push_back(inside(nearest));
-    }
-    static vec3 inside(vec3 p) {
-        const vec3 low{kLeastFraction, kLeastFraction, kLeastFraction};
-        return min(max(p, low), vec3{1, 1, 1} - low);
+        return {inside(middle), inside(nearest)};
     }
 
-    // Tries `candidate(i)` for the vertices off the surface by more than `off`, and keeps it where it is nearer.
+    // Tries `candidate(sheet)` for those off the surface by more than `off`, and keeps it where it is nearer.
     template <typename Candidate>
     void improve(size_t index, float off, Candidate&& candidate, Scratch& s) const {
-        s.batch.clear();
+        s.batch.count = 0;
         s.open.clear();
-        for (size_t i = 0; i < s.at.size(); ++i) {
-            if (!(std::fabs(s.off[i]) > off)) continue;
-            s.open.push_back(uint32_t(i));
-            const vec3 p = world(s.voxel[i], candidate(i));
-            s.batch.add(p.x, p.y, p.z);
+        for (uint32_t i = 0; i < s.sheets.size(); ++i) {
+            if (!(std::fabs(s.sheets[i].off) > off)) continue;
+            s.open.push_back(i);
+            s.batch.add(world(index, s.sheets[i].voxel, candidate(s.sheets[i])));
         }
         s.batch.run(exact_, index);
         for (size_t k = 0; k < s.open.size(); ++k) {
-            const size_t i = s.open[k];
+            Sheet& sheet = s.sheets[s.open[k]];
             const float value = s.batch.value[k] * per_voxel_;
-            if (!(std::fabs(value) < std::fabs(s.off[i]))) continue;
-            s.at[i] = candidate(i);
-            s.off[i] = value;
+            if (!(std::fabs(value) < std::fabs(sheet.off))) continue;
+            sheet.at = candidate(sheet);
+            sheet.off = value;
         }
     }
 
     // Planes only meet on the surface where it is flat: measure, step once along the normal, and where that is not enough take the
     // middle of the crossings, stepped too, or a crossing itself.
-    void settle(size_t index, Scratch& s) const {
-        s.off.assign(s.at.size(), std::numeric_limits<float>::infinity());
-        improve(index, 0.0f, [&](size_t i) { return s.at[i]; }, s);
-        const auto stepped = [&](size_t i) { return inside(s.at[i] - s.normal[i] * s.off[i]); };
+    void settle(size_t index, const EdgeNumbers& numbers, Scratch& s) const {
+        for (Sheet& sheet : s.sheets) sheet.off = std::numeric_limits<float>::infinity();
+        improve(index, 0.0f, [](const Sheet& sheet) { return sheet.at; }, s);
+        const auto stepped = [](const Sheet& sheet) { return inside(sheet.at - sheet.normal * sheet.off); };
         improve(index, kStill, stepped, s);
-        improve(index, kSharpTolerance, stepped, s);
-        improve(index, kSharpTolerance, [&](size_t i) { return s.middle[i]; }, s);
-        improve(index, kSharpTolerance, stepped, s);
-        improve(index, kSharpTolerance, [&](size_t i) { return s.fallback[i]; }, s);
+        const bool far = std::any_of(s.sheets.begin(), s.sheets.end(),
+                                     [](const Sheet& sheet) { return !(std::fabs(sheet.off) <= kSharpTolerance); });
+        if (far) {
+            improve(index, kSharpTolerance, stepped, s);
+            improve(index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).middle; }, s);
+            improve(index, kSharpTolerance, stepped, s);
+            improve(index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).crossing; }, s);
+        }
         // Two sheets of a voxel may be driven into one corner of it.
-        for (size_t i = 1; i < s.at.size(); ++i) {
-            for (size_t j = i; j > 0 && s.voxel[j - 1] == s.voxel[i]; --j)
-                if (s.at[j - 1] == s.at[i]) s.at[i] = s.fallback[i];
+        for (size_t i = 1; i < s.sheets.size(); ++i) {
+            for (size_t j = i; j > 0 && s.sheets[j - 1].voxel == s.sheets[i].voxel; --j) {
+                if (s.sheets[j - 1].at == s.sheets[i].at) s.sheets[i].at = safe(index, numbers, s.sheets[i]).crossing;
+            }
         }
     }
 
     // Corner that the quad's diagonal starts from. The surface passes the quad's edge at the crossing: the diagonal nearer to it
     // lies along a crease. A diagonal that turns a triangle over comes last.
-    int diagonal(const uint32_t (&ring)[4], ivec3 texel, int axis, const Crossing& c) const {
-        const vec3 middle = world(texel, on_edge(axis, c.t));
+    int diagonal(const uint32_t (&ring)[4], vec3 middle, const Crossing& c) const {
         vec3 p[4];
         for (size_t i = 0; i < 4; ++i) p[i] = (out_.positions[ring[i]] - middle) * per_voxel_;
         float cost[2];
