@@ -5,6 +5,7 @@
 #pragma once
 
 #include <kiln/edit.h>
+#include <kiln/mesh.h>
 #include <kiln/query.h>
 #include <kiln/renderer.h>
 #include <kiln/result.h>
@@ -69,6 +70,8 @@ public:
     Box3 bounds() const;
     /// What a renderer needs, with an immutable snapshot of the field. Camera by name; the first (or an automatic one) when empty.
     Result<Frame> frame(std::string_view camera = {}) const;
+    /// The surface as triangles. Fails where nothing is solid, and where `cell` asks for more than memory holds.
+    Result<Mesh> mesh(const MeshSettings& settings = {}) const;
 
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;

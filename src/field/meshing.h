@@ -27,4 +27,17 @@ ExactBrick exact_of(const HostBricks& host, const MeshBricks& bricks);
 void mesh_sharp(const MeshBricks& bricks, const ExactBrick& exact, Mesh& out, int workers = 0);
 inline constexpr float kSharpTolerance = 0.1f;  // voxels
 
+/// What the exact field says at the vertices.
+struct MeshSurface {
+    std::vector<vec3> normals;            ///< unit; 0 where the gradient vanishes; empty where not asked for
+    std::vector<sdf::MaterialMix> mixes;  ///< kNoMaterial only where the whole world has none
+};
+MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const Mesh& mesh, bool normals,
+                       int workers = 0);
+
+/// Fewer triangles: at most `target` where the surface need not move by more than `error` metres for that. Vertices stay where
+/// they are; some are no longer used. With `keep_border`, open edges stay as they are.
+void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, size_t target, float error,
+              bool keep_border);
+
 }  // namespace kiln::field

@@ -158,8 +158,8 @@ private:
         const MeshBricks::Row* row = edges_.bricks().row(cell.y, cell.z);
         if (row == nullptr) return std::nullopt;
         const auto all = edges_.bricks().bricks().subspan(row->first, row->end - row->first);
-        const auto it = std::lower_bound(all.begin(), all.end(), cell.x,
-                                         [](const MeshBrick& b, int x) { return b.cell.x < x; });
+        const auto it =
+            std::lower_bound(all.begin(), all.end(), cell.x, [](const MeshBrick& b, int x) { return b.cell.x < x; });
         if (it == all.end() || it->cell.x != cell.x) return std::nullopt;
         return size_t(row->first) + size_t(it - all.begin());
     }
@@ -250,7 +250,8 @@ public:
         const float scale = per_voxel_ / (2 * kGradientStep);
         for (int axis = 0; axis < 3; ++axis) {
             for (size_t i = first[axis]; i < first[size_t(axis) + 1]; ++i) {
-                const float d[6] = {v[i], v[count + i], v[2 * count + i], v[3 * count + i], v[4 * count + i], v[5 * count + i]};
+                const float d[6] = {
+                    v[i], v[count + i], v[2 * count + i], v[3 * count + i], v[4 * count + i], v[5 * count + i]};
                 const vec3 g{(d[0] - d[1]) * scale, (d[2] - d[3]) * scale, (d[4] - d[5]) * scale};
                 const float value = (d[2 * axis] + d[2 * axis + 1]) * 0.5f * per_voxel_;
                 const float slope = axis == 0 ? g.x : axis == 1 ? g.y : g.z;
@@ -319,7 +320,8 @@ public:
                     const uint32_t* const q = around_.data() + 4 * size_t(e);
                     const bool forward = low_is_solid != (axis == 1);
                     const uint32_t ring[4] = {q[0], forward ? q[1] : q[2], q[3], forward ? q[2] : q[1]};
-                    const int first = diagonal(ring, world(index, z * 64 + bit, on_edge(axis, crossings_[e].t)), crossings_[e]);
+                    const int first =
+                        diagonal(ring, world(index, z * 64 + bit, on_edge(axis, crossings_[e].t)), crossings_[e]);
                     for (const int corner : {0, 1, 2, 0, 2, 3}) *to++ = ring[(first + corner) & 3];
                 }
             }
@@ -335,9 +337,7 @@ private:
     }
     static float fraction(float t) { return std::min(std::max(t, kLeastFraction), 1 - kLeastFraction); }
     static vec3 on_edge(int axis, float t) { return {axis == 0 ? t : 0, axis == 1 ? t : 0, axis == 2 ? t : 0}; }
-    vec3 world(vec3 texel, vec3 p) const {
-        return {(texel.x + p.x) * h_, (texel.y + p.y) * h_, (texel.z + p.z) * h_};
-    }
+    vec3 world(vec3 texel, vec3 p) const { return {(texel.x + p.x) * h_, (texel.y + p.y) * h_, (texel.z + p.z) * h_}; }
     vec3 world(size_t brick, int texel, vec3 p) const {
         const ivec3 cell = edges_.bricks().bricks()[brick].cell;
         return world(vec3{float(cell.x * kBrickVoxels + (texel & 7)), float(cell.y * kBrickVoxels + (texel >> 3 & 7)),
@@ -372,7 +372,8 @@ private:
             float low_t = 0, high_t = 1, low, high;
         };
         std::vector<Bracket> all, open;
-        for (const uint32_t e : s.open) all.push_back({e, e < first[1] ? 0 : e < first[2] ? 1 : 2, 0, 0, 1, s.low[e], s.high[e]});
+        for (const uint32_t e : s.open)
+            all.push_back({e, e < first[1] ? 0 : e < first[2] ? 1 : 2, 0, 0, 1, s.low[e], s.high[e]});
         const auto texel = [&](uint32_t e) { return vec3{s.x[e], s.y[e], s.z[e]}; };
         open = all;
         for (int step = 0; step < kRootSteps && !open.empty(); ++step) {
@@ -453,8 +454,9 @@ private:
         const float c_yy = xx * zz - xz * xz, c_yz = xy * xz - xx * yz, c_zz = xx * yy - xy * xy;
         const float scale = 1 / (xx * c_xx + xy * c_xy + xz * c_xz);
         const float4 column_x{c_xx, c_xy, c_xz, 0}, column_y{c_xy, c_yy, c_yz, 0}, column_z{c_xz, c_yz, c_zz, 0};
-        const float4 at = middle + (column_x * all_of(right[0]) + column_y * all_of(right[1]) + column_z * all_of(right[2])) *
-                                       all_of(scale);
+        const float4 at =
+            middle +
+            (column_x * all_of(right[0]) + column_y * all_of(right[1]) + column_z * all_of(right[2])) * all_of(scale);
         sheet.at = inside({at[0] + 0.5f, at[1] + 0.5f, at[2] + 0.5f});
         const vec3 n{normal[0], normal[1], normal[2]};
         const float size = length(n);
@@ -473,7 +475,8 @@ private:
         int count = 0;
         for (int i = loops.first[sheet.loop]; i < loops.first[sheet.loop + 1]; ++i) {
             const EdgePlace& place = kEdgePlace[loops.edges[i]];
-            const float4 p = place.origin + place.along * all_of(crossings_[numbers[sheet.voxel + kEdgeOffset[loops.edges[i]]]].t);
+            const float4 p =
+                place.origin + place.along * all_of(crossings_[numbers[sheet.voxel + kEdgeOffset[loops.edges[i]]]].t);
             points[count] = {p[0] + 0.5f, p[1] + 0.5f, p[2] + 0.5f};
             middle = middle + points[count++];
         }
@@ -510,16 +513,19 @@ private:
     // middle of the crossings, stepped too, or a crossing itself.
     void settle(size_t index, const EdgeNumbers& numbers, Scratch& s) const {
         for (Sheet& sheet : s.sheets) sheet.off = std::numeric_limits<float>::infinity();
-        improve(index, 0.0f, [](const Sheet& sheet) { return sheet.at; }, s);
+        improve(
+            index, 0.0f, [](const Sheet& sheet) { return sheet.at; }, s);
         const auto stepped = [](const Sheet& sheet) { return inside(sheet.at - sheet.normal * sheet.off); };
         improve(index, kStill, stepped, s);
         const bool far = std::any_of(s.sheets.begin(), s.sheets.end(),
                                      [](const Sheet& sheet) { return !(std::fabs(sheet.off) <= kSharpTolerance); });
         if (far) {
             improve(index, kSharpTolerance, stepped, s);
-            improve(index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).middle; }, s);
+            improve(
+                index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).middle; }, s);
             improve(index, kSharpTolerance, stepped, s);
-            improve(index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).crossing; }, s);
+            improve(
+                index, kSharpTolerance, [&](const Sheet& sheet) { return safe(index, numbers, sheet).crossing; }, s);
         }
         // Two sheets of a voxel may be driven into one corner of it.
         for (size_t i = 1; i < s.sheets.size(); ++i) {
@@ -559,7 +565,8 @@ ExactBrick exact_of(const HostBricks& host, const MeshBricks& bricks) {
     return [&host, &bricks](size_t brick, const sdf::Points& points, float* out) {
         const Field& field = host.field();
         const BrickRecord& record = field.records()[bricks.bricks()[brick].slot];
-        sdf::evaluate(sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)), points, out);
+        sdf::evaluate(sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)), points,
+                      out);
     };
 }
 

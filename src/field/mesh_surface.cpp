@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+#include "field/meshing.h"
+
+#include "base/parallel_for.h"
+
+#include <meshoptimizer.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace kiln::field {
+
+MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const Mesh& mesh, bool normals, int workers) {
+    constexpr size_t kMost = 512;            // points asked at once
+    constexpr float kStepVoxels = 1.0f / 32;  // as in the sharp mesher
+    MeshSurface out;
+    out.mixes.resize(mesh.vertex_count());
+    if (normals) out.normals.resize(mesh.vertex_count());
+    const ExactBrick exact = exact_of(host, bricks);
+    const Field& field = host.field();
+    const float step = kStepVoxels * bricks.voxel_size();
+    const auto points = [&](size_t brick, size_t first, size_t count) {
+        float x[kMost], y[kMost], z[kMost], value[kMost], plus[kMost], minus[kMost];
+        const auto fill = [&](vec3 by) {
+            for (size_t i = 0; i < count; ++i) {
+                const vec3 p = mesh.positions[first + i] + by;
+                x[i] = p.x, y[i] = p.y, z[i] = p.z;
+            }
+        };
+        const sdf::Points at{x, y, z, int(count)};
+        fill({});
+        const BrickRecord& record = field.records()[bricks.bricks()[brick].slot];
+        sdf::evaluate_materials(
+            sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)), at, value,
+            out.mixes.data() + first);
+        if (!normals) return;
+        float slopes[3][kMost];
+        for (int axis = 0; axis < 3; ++axis) {
+            const vec3 by{axis == 0 ? step : 0, axis == 1 ? step : 0, axis == 2 ? step : 0};
+            fill(by);
+            exact(brick, at, plus);
+            fill(-by);
+            exact(brick, at, minus);
+            for (size_t i = 0; i < count; ++i) slopes[axis][i] = plus[i] - minus[i];
+        }
+        for (size_t i = 0; i < count; ++i) {
+            const vec3 g{slopes[0][i], slopes[1][i], slopes[2][i]};
+            const float size = length(g);
+            out.normals[first + i] = size > 1e-3f * step ? g / size : vec3{};
+        }
+    };
+    parallel_for(
+        bricks.bricks().size(), workers,
+        [&](int brick) {
+            const size_t end = mesh.brick_vertices[size_t(brick) + 1];
+            for (size_t first = mesh.brick_vertices[size_t(brick)]; first < end; first += kMost)
+                points(size_t(brick), first, std::min(kMost, end - first));
+        },
+        16);
+    return out;
+}
+
+void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, size_t target, float error,
+              bool keep_border) {
+    if (triangles.size() <= 3 * target) return;
+    std::vector<uint32_t> out(triangles.size());
+    const float* const first = &positions.front().x;
+    // The library counts errors in parts of the mesh's extent.
+    const float scale = meshopt_simplifyScale(first, positions.size(), sizeof(vec3));
+    const unsigned options = keep_border ? meshopt_SimplifyLockBorder : 0;
+    out.resize(meshopt_simplify(out.data(), triangles.data(), triangles.size(), first, positions.size(), sizeof(vec3),
+                                3 * target, scale > 0 ? error / scale : error, options, nullptr));
+    triangles = std::move(out);
+}
+
+}  // namespace kiln::field

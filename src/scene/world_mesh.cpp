@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MIT
+// World: its surface as a mesh, with materials.
+
+#include "scene/world_impl.h"
+
+#include "field/mesh_facts.h"
+#include "field/meshing.h"
+
+#include "base/format.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace kiln {
+
+namespace {
+
+constexpr double kMaxCells = double(1u << 25);  // of a grid: 128 MiB of cell words
+constexpr float kMargin = 3;                    // voxels of grid around what is meshed, so that nothing is cut by the grid
+constexpr const char* kDefaultName = "default";
+
+// The edits that make one more: everything outside the box is cut away, and what was there keeps its material.
+Edit cut_to(const Box3& box) {
+    Edit e;
+    e.node.shape = Box{.half_extents = box.half_extents()};
+    e.node.transform.position = box.center();
+    e.op = Op::Intersect;
+    return e;
+}
+
+bool positive(const Box3& box) { return box.finite() && box.min.x < box.max.x && box.min.y < box.max.y && box.min.z < box.max.z; }
+
+Error too_fine(float cell, const std::string& why) {
+    return {formatted("a mesh of cells of {} m: {}; choose larger cells or smaller bounds", cell, why), ErrorKind::OutOfMemory};
+}
+
+// A triangle's part: the material most of its vertices have, and whether one of them has two.
+struct PartKey {
+    uint16_t material;
+    bool blended;
+    friend auto operator<=>(const PartKey&, const PartKey&) = default;
+};
+PartKey part_of(const sdf::MaterialMix& a, const sdf::MaterialMix& b, const sdf::MaterialMix& c) {
+    const uint16_t most = b.id0 == c.id0 ? b.id0 : a.id0 == b.id0 || a.id0 == c.id0 ? a.id0 : std::min({a.id0, b.id0, c.id0});
+    return {most, a.weight > 0 || b.weight > 0 || c.weight > 0};
+}
+
+// Drops vertices that no triangle uses.
+void compact(Mesh& mesh) {
+    std::vector<uint32_t> number(mesh.positions.size(), UINT32_MAX);
+    for (const uint32_t v : mesh.triangles) number[v] = 0;
+    uint32_t kept = 0;
+    for (uint32_t v = 0; v < number.size(); ++v) {
+        if (number[v] != 0) continue;
+        number[v] = kept;
+        const auto move = [&](auto& values) {
+            if (!values.empty()) values[kept] = values[v];
+        };
+        move(mesh.positions), move(mesh.normals), move(mesh.colors), move(mesh.roughness), move(mesh.metallic);
+        ++kept;
+    }
+    const auto cut = [&](auto& values) { values.resize(std::min<size_t>(values.size(), kept)); };
+    cut(mesh.positions), cut(mesh.normals), cut(mesh.colors), cut(mesh.roughness), cut(mesh.metallic);
+    for (uint32_t& v : mesh.triangles) v = number[v];
+}
+
+}  // namespace
+
+Result<Mesh> World::mesh(const MeshSettings& settings) const {
+    if (!std::isfinite(settings.cell) || settings.cell < 0)
+        return Error{formatted("a mesh of cells of {} m: write a finite length above 0, or 0 for the world's voxel size",
+                               settings.cell),
+                     ErrorKind::Usage};
+    if (!(settings.simplify_share > 0 && settings.simplify_share <= 1) || !(settings.simplify_error >= 0))
+        return Error{"simplifying a mesh: keep a share in (0, 1], and an error of 0 or more metres", ErrorKind::Usage};
+    const auto plain = impl_->compiled();
+    if (!plain) return plain.error();
+    const Impl::Resolution r = impl_->resolution(**plain, field_settings);
+    const Box3 bounds = settings.bounds.value_or(r.bounds);
+    if (!positive(bounds)) return Error{"a mesh's bounds must be finite, with min below max", ErrorKind::Usage};
+    const float cell = settings.cell > 0 ? settings.cell : r.voxel_size;
+
+    // Smooth unions bulge beyond the solids' own bounds by at most a quarter of the blend radius.
+    float reach = 0;
+    for (const sdf::EditSpan& edit : (*plain)->edits) reach = std::max(reach, edit.reach);
+    const Box3 solid = (*plain)->bounds.inflated(reach);
+    const bool within = !(*plain)->unbounded && bounds.contains(solid.min) && bounds.contains(solid.max);
+    std::shared_ptr<const sdf::Program> program = *plain;
+    if (!within && !(*plain)->edits.empty()) {
+        std::vector<Edit> edits = impl_->data.edits;
+        edits.push_back(cut_to(bounds));
+        const std::lock_guard lock(impl_->mutex);
+        const auto source = scene::with_grids(edits, impl_->data.objects, impl_->data.folder, impl_->grids);
+        if (!source) return source.error();
+        auto made = sdf::compile(source->source());
+        if (!made) return made.error();
+        program = std::make_shared<const sdf::Program>(std::move(*made));
+    }
+
+    field::FieldOptions options;
+    options.voxel_size = cell;
+    options.bounds = (within ? box_intersection(bounds, solid) : bounds).inflated(kMargin * cell);
+    options.workers = settings.workers;
+    if ((*plain)->edits.empty() || !positive(options.bounds))
+        return Error{"there is nothing to mesh: the world has no edits", ErrorKind::Failed};
+    const vec3 size = (options.bounds.max - options.bounds.min) / (cell * float(field::kBrickVoxels));
+    if ((double(size.x) + 2) * (double(size.y) + 2) * (double(size.z) + 2) > kMaxCells)
+        return too_fine(cell, "the grid does not fit");
+    const auto made_field = field::Field::build(program, options);
+    if (!made_field) {
+        if (made_field.error().kind == ErrorKind::OutOfMemory) return too_fine(cell, made_field.error().message);
+        return made_field.error();
+    }
+    const field::HostBricks host = field::HostBricks::bake(*made_field, settings.workers);
+    const field::MeshBricks bricks(host);
+    field::Mesh raw;
+    if (settings.sharp)
+        field::mesh_sharp(bricks, field::exact_of(host, bricks), raw, settings.workers);
+    else
+        field::mesh_smooth(bricks, raw, settings.workers);
+    if (raw.triangle_count() == 0)
+        return Error{"there is nothing to mesh: nothing within the bounds is solid, or it is thinner than a cell",
+                     ErrorKind::Failed};
+    field::MeshSurface surface = field::surface_of(host, bricks, raw, !settings.sharp, settings.workers);
+
+    Mesh out;
+    out.positions.assign(raw.positions.span().begin(), raw.positions.span().end());
+    out.normals = std::move(surface.normals);
+    for (sdf::MaterialMix& mix : surface.mixes) {
+        if (mix.id0 == uint16_t(sdf::kNoMaterial)) mix.id0 = uint16_t(sdf::kDefaultMaterial);
+        if (mix.id1 == uint16_t(sdf::kNoMaterial)) mix.id1 = mix.id0;
+        if (mix.id1 == mix.id0) mix.weight = 0;
+    }
+    const auto& named = impl_->data.materials;
+    const Material grey;
+    const auto material = [&](uint16_t number) -> const Material& {
+        return number == sdf::kDefaultMaterial || number > named.size() ? grey : named[number - 1u].second;
+    };
+    for (const sdf::MaterialMix& mix : surface.mixes) {
+        const Material &a = material(mix.id0), &b = material(mix.id1);
+        const float t = mix.weight;
+        out.colors.push_back(a.base_color * (1 - t) + b.base_color * t);
+        out.roughness.push_back(a.roughness * (1 - t) + b.roughness * t);
+        out.metallic.push_back(a.metallic * (1 - t) + b.metallic * t);
+    }
+
+    std::map<PartKey, std::vector<uint32_t>> parts;
+    for (size_t t = 0; t < raw.triangles.size(); t += 3) {
+        const uint32_t* const v = raw.triangles.data() + t;
+        std::vector<uint32_t>& part = parts[part_of(surface.mixes[v[0]], surface.mixes[v[1]], surface.mixes[v[2]])];
+        part.insert(part.end(), v, v + 3);
+    }
+    for (auto& [key, triangles] : parts) {
+        if (settings.simplify_share < 1 || settings.simplify_error > 0) {
+            const bool by_error = settings.simplify_share == 1;
+            const size_t target = by_error ? 0 : size_t(double(triangles.size() / 3) * double(settings.simplify_share));
+            const float error = settings.simplify_error > 0 ? settings.simplify_error : std::numeric_limits<float>::max();
+            field::simplify(out.positions, triangles, target, error, parts.size() > 1);
+        }
+        if (triangles.empty()) continue;
+        MeshPart part;
+        part.name = key.material == sdf::kDefaultMaterial || key.material > named.size() ? kDefaultName
+                                                                                         : named[key.material - 1u].first;
+        part.material = material(key.material);
+        part.blended = key.blended;
+        part.first = uint32_t(out.triangles.size() / 3);
+        part.count = uint32_t(triangles.size() / 3);
+        out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());
+        out.parts.push_back(std::move(part));
+    }
+    compact(out);
+    return out;
+}
+
+MeshReport measure(const Mesh& mesh) {
+    const field::MeshFacts f = field::mesh_facts(mesh.positions, mesh.triangles);
+    return {f.vertices, f.triangles, f.open_edges, f.non_manifold_edges, f.volume, f.area, f.bounds};
+}
+
+}  // namespace kiln
