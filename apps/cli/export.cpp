@@ -38,7 +38,10 @@ std::optional<Quantity> quantity(std::string_view text) {
 std::optional<float> metres(std::string_view text, bool plain) {
     const std::optional<Quantity> q = quantity(text);
     if (!q || !(q->value > 0)) return std::nullopt;
-    const double unit = q->unit == "m" || (plain && q->unit.empty()) ? 1 : q->unit == "cm" ? 0.01 : q->unit == "mm" ? 0.001 : 0;
+    const double unit = q->unit == "m" || (plain && q->unit.empty()) ? 1
+                        : q->unit == "cm"                            ? 0.01
+                        : q->unit == "mm"                            ? 0.001
+                                                                     : 0;
     if (unit == 0) return std::nullopt;
     return float(q->value * unit);
 }
@@ -59,8 +62,9 @@ Result<MeshSettings> settings_of(const Options& o) {
         } else if (share && share->unit.empty() && share->value > 0 && share->value <= 1) {
             s.simplify_share = float(share->value);
         } else {
-            return usage("--simplify " + o.simplify +
-                         ": write the share of triangles to keep, such as 0.25, or how far the surface may move, such as 2mm");
+            return usage(
+                "--simplify " + o.simplify +
+                ": write the share of triangles to keep, such as 0.25, or how far the surface may move, such as 2mm");
         }
     }
     return s;
@@ -83,7 +87,8 @@ int export_mesh(const Options& o) {
     const auto format = format_of(o);
     if (!format) return fail(format.error());
     if (!piped && mesh_format(o.output) != *format)
-        return fail(usage("-o " + o.output + " --format " + o.format + ": the name's ending says otherwise; leave --format out"));
+        return fail(usage("-o " + o.output + " --format " + o.format +
+                          ": the name's ending says otherwise; leave --format out"));
     if (piped && ::isatty(STDOUT_FILENO) == 1)
         return fail(usage("-o -: a mesh is not text for a terminal; pipe it on, or name a file"));
     if (piped && o.json) return fail(usage("-o - --json: both want stdout; name a file"));
@@ -122,7 +127,8 @@ int export_mesh(const Options& o) {
     }
     if (!o.json) return piped ? finish_data() : kDone;
     const auto corner = [](vec3 v) {
-        return "[" + Json::digits(double(v.x)) + ", " + Json::digits(double(v.y)) + ", " + Json::digits(double(v.z)) + "]";
+        return "[" + Json::digits(double(v.x)) + ", " + Json::digits(double(v.y)) + ", " + Json::digits(double(v.z)) +
+               "]";
     };
     std::string parts;
     for (const MeshPart& part : mesh->parts) {
@@ -136,7 +142,10 @@ int export_mesh(const Options& o) {
     json.text("scene", o.scene).text("output", o.output).flag("sharp", o.sharp);
     json.number("vertices", double(r.vertices)).number("triangles", double(r.triangles));
     json.number("open_edges", double(r.open_edges)).number("non_manifold_edges", double(r.non_manifold_edges));
-    json.number("volume", r.volume).number("area", r.area).raw("bounds", bounds.object()).raw("parts", "[" + parts + "]");
+    json.number("volume", r.volume)
+        .number("area", r.area)
+        .raw("bounds", bounds.object())
+        .raw("parts", "[" + parts + "]");
     json.number("mesh_ms", mesh_ms).number("total_ms", total.seconds() * 1000);
     (void)put(json.line());
     return finish_data();
@@ -146,18 +155,20 @@ int export_mesh(const Options& o) {
 
 void add_export(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App* verb = app.add_subcommand("export",
-                                        "Writes the surface as a closed mesh, cut at the field's bounds. Needs no device.\n\n"
-                                        "Examples:\n"
-                                        "  kiln export potter -o potter.glb\n"
-                                        "  kiln export my.kiln.json -o part.stl --sharp --cell 2mm\n"
-                                        "  kiln export quarry -o - --format ply --simplify 0.1 > quarry.ply");
+    CLI::App* verb =
+        app.add_subcommand("export",
+                           "Writes the surface as a closed mesh, cut at the field's bounds. Needs no device.\n\n"
+                           "Examples:\n"
+                           "  kiln export potter -o potter.glb\n"
+                           "  kiln export my.kiln.json -o part.stl --sharp --cell 2mm\n"
+                           "  kiln export quarry -o - --format ply --simplify 0.1 > quarry.ply");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("-o,--output", o->output, "mesh to write: .glb, .obj, .stl or .ply; - for a pipe")->required();
     verb->add_option("--format", o->format, "glb, obj, stl or ply, where -o is -");
     verb->add_option("--cell", o->cell, "metres between samples (or 5mm, 1cm); left out: the scene's voxel size");
     verb->add_flag("--sharp", o->sharp, "keep edges and corners of shapes");
-    verb->add_option("--simplify", o->simplify, "share of triangles to keep (0.25), or how far the surface may move (2mm)");
+    verb->add_option("--simplify", o->simplify,
+                     "share of triangles to keep (0.25), or how far the surface may move (2mm)");
     verb->add_flag("--json", o->json, "one object with counts and measures, on stdout");
     verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
     verb->callback([o, &run] { run = [o] { return export_mesh(*o); }; });

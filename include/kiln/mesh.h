@@ -17,12 +17,12 @@
 namespace kiln {
 
 struct MeshSettings {
-    float cell = 0;              ///< metres between samples; 0: the world's voxel size
-    bool sharp = false;          ///< keeps edges and corners of shapes; else marching cubes, rounder and with smooth normals
+    float cell = 0;      ///< metres between samples; 0: the world's voxel size
+    bool sharp = false;  ///< keeps edges and corners of shapes; else marching cubes, rounder and with smooth normals
     std::optional<Box3> bounds;  ///< where the mesh is cut; none: the field's bounds
     float simplify_share = 1;    ///< (0, 1]: triangles to keep, where simplify_error allows it
-    float simplify_error = 0;    ///< metres the surface may move by simplifying; 0: any, where simplify_share is below 1
-    int workers = 0;             ///< 0: all cores; the mesh does not depend on it
+    float simplify_error = 0;  ///< metres the surface may move by simplifying; 0: any, where simplify_share is below 1
+    int workers = 0;           ///< 0: all cores; the mesh does not depend on it
 };
 
 /// Consecutive triangles of one material.
@@ -39,12 +39,12 @@ enum class MeshFormat : uint8_t { Glb, Obj, Stl, Ply };
 /// Vertices and triangles in metres, right-handed, +Y up; anticlockwise as seen from outside.
 struct Mesh {
     std::vector<vec3> positions;
-    std::vector<vec3> normals;       ///< unit; empty in sharp meshes, whose creases have no one normal
-    std::vector<vec3> colors;        ///< base colour, linear
-    std::vector<float> roughness;    ///< as in Material
-    std::vector<float> metallic;     ///< likewise
+    std::vector<vec3> normals;        ///< unit; empty in sharp meshes, whose creases have no one normal
+    std::vector<vec3> colors;         ///< base colour, linear
+    std::vector<float> roughness;     ///< as in Material
+    std::vector<float> metallic;      ///< likewise
     std::vector<uint32_t> triangles;  ///< three vertices each
-    std::vector<MeshPart> parts;     ///< cover all triangles, in order
+    std::vector<MeshPart> parts;      ///< cover all triangles, in order
 
     /// Writes .glb, .obj (with an .mtl beside it), .stl or .ply. The file appears whole or not at all.
     Result<void> save(const std::string& path) const;

@@ -2,11 +2,11 @@
 #include "field/mesh_facts.h"
 
 #include <algorithm>
-#include <vector>
 
 namespace kiln::field {
 
-MeshFacts mesh_facts(std::span<const vec3> positions, std::span<const uint32_t> triangles) {
+MeshFacts mesh_facts(std::span<const vec3> positions, std::span<const uint32_t> triangles,
+                     std::vector<uint32_t>* faulty) {
     MeshFacts out;
     out.triangles = triangles.size() / 3;
 
@@ -34,10 +34,10 @@ MeshFacts mesh_facts(std::span<const vec3> positions, std::span<const uint32_t> 
         for (auto it = begin; it != end;) {
             const auto same = std::find_if(it, end, [&](uint64_t e) { return e / 2 != *it / 2; });
             ++out.edges;
-            if (same - it == 1)
-                ++out.open_edges;
-            else if (same - it > 2 || *it == *(it + 1))
-                ++out.non_manifold_edges;
+            const bool open = same - it == 1, odd = same - it > 2 || (!open && *it == *(it + 1));
+            out.open_edges += open;
+            out.non_manifold_edges += odd;
+            if (faulty != nullptr && (open || odd)) faulty->insert(faulty->end(), {uint32_t(v), uint32_t(*it / 2)});
             it = same;
         }
     }

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <span>
+#include <vector>
 
 namespace kiln::field {
 
@@ -22,6 +23,8 @@ struct MeshFacts {
     int64_t euler() const { return int64_t(vertices) - int64_t(edges) + int64_t(triangles); }
 };
 
-MeshFacts mesh_facts(std::span<const vec3> positions, std::span<const uint32_t> triangles);
+/// `faulty`: is given the vertices of open and non-manifold edges.
+MeshFacts mesh_facts(std::span<const vec3> positions, std::span<const uint32_t> triangles,
+                     std::vector<uint32_t>* faulty = nullptr);
 
 }  // namespace kiln::field

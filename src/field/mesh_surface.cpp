@@ -3,15 +3,13 @@
 
 #include "base/parallel_for.h"
 
-#include <meshoptimizer.h>
-
 #include <algorithm>
 #include <cmath>
 
 namespace kiln::field {
 
 MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const Mesh& mesh, bool normals, int workers) {
-    constexpr size_t kMost = 512;            // points asked at once
+    constexpr size_t kMost = 512;             // points asked at once
     constexpr float kStepVoxels = 1.0f / 32;  // as in the sharp mesher
     MeshSurface out;
     out.mixes.resize(mesh.vertex_count());
@@ -30,9 +28,8 @@ MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const M
         const sdf::Points at{x, y, z, int(count)};
         fill({});
         const BrickRecord& record = field.records()[bricks.bricks()[brick].slot];
-        sdf::evaluate_materials(
-            sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)), at, value,
-            out.mixes.data() + first);
+        sdf::evaluate_materials(sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)),
+                                at, value, out.mixes.data() + first);
         if (!normals) return;
         float slopes[3][kMost];
         for (int axis = 0; axis < 3; ++axis) {
@@ -58,19 +55,6 @@ MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const M
         },
         16);
     return out;
-}
-
-void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, size_t target, float error,
-              bool keep_border) {
-    if (triangles.size() <= 3 * target) return;
-    std::vector<uint32_t> out(triangles.size());
-    const float* const first = &positions.front().x;
-    // The library counts errors in parts of the mesh's extent.
-    const float scale = meshopt_simplifyScale(first, positions.size(), sizeof(vec3));
-    const unsigned options = keep_border ? meshopt_SimplifyLockBorder : 0;
-    out.resize(meshopt_simplify(out.data(), triangles.data(), triangles.size(), first, positions.size(), sizeof(vec3),
-                                3 * target, scale > 0 ? error / scale : error, options, nullptr));
-    triangles = std::move(out);
 }
 
 }  // namespace kiln::field

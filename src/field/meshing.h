@@ -35,9 +35,4 @@ struct MeshSurface {
 MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const Mesh& mesh, bool normals,
                        int workers = 0);
 
-/// Fewer triangles: at most `target` where the surface need not move by more than `error` metres for that. Vertices stay where
-/// they are; some are no longer used. With `keep_border`, open edges stay as they are.
-void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, size_t target, float error,
-              bool keep_border);
-
 }  // namespace kiln::field

@@ -114,7 +114,8 @@ std::string encode_ply(const Mesh& mesh) {
     out += "property float x\nproperty float y\nproperty float z\n";
     if (!mesh.normals.empty()) out += "property float nx\nproperty float ny\nproperty float nz\n";
     out += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-    out += "element face " + std::to_string(mesh.triangles.size() / 3) + "\nproperty list uchar uint vertex_indices\nend_header\n";
+    out += "element face " + std::to_string(mesh.triangles.size() / 3) +
+           "\nproperty list uchar uint vertex_indices\nend_header\n";
     for (size_t v = 0; v < mesh.positions.size(); ++v) {
         append_bytes(out, mesh.positions[v]);
         if (!mesh.normals.empty()) append_bytes(out, mesh.normals[v]);

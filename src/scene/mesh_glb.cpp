@@ -25,12 +25,19 @@ public:
 
     template <typename T>
     size_t view(const std::vector<T>& values, int target) {
-        views.push_back({{"buffer", 0}, {"byteOffset", bytes_.size()}, {"byteLength", values.size() * sizeof(T)}, {"target", target}});
+        views.push_back({{"buffer", 0},
+                         {"byteOffset", bytes_.size()},
+                         {"byteLength", values.size() * sizeof(T)},
+                         {"target", target}});
         bytes_.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
         return views.size() - 1;
     }
     size_t accessor(size_t view, size_t offset, int component, size_t count, const char* type) {
-        accessors.push_back({{"bufferView", view}, {"byteOffset", offset}, {"componentType", component}, {"count", count}, {"type", type}});
+        accessors.push_back({{"bufferView", view},
+                             {"byteOffset", offset},
+                             {"componentType", component},
+                             {"count", count},
+                             {"type", type}});
         return accessors.size() - 1;
     }
     template <typename T>
@@ -96,9 +103,10 @@ Result<std::string> encode_glb(const Mesh& mesh) {
         const MeshPart& part = mesh.parts[i];
         materials.push_back(material_json(part, names[i]));
         strength = strength || materials.back().contains("extensions");
-        primitives.push_back({{"attributes", part.blended ? seam_attributes : attributes},
-                              {"indices", body.accessor(indices, size_t(part.first) * 12, kUnsigned, size_t(part.count) * 3, "SCALAR")},
-                              {"material", i}});
+        primitives.push_back(
+            {{"attributes", part.blended ? seam_attributes : attributes},
+             {"indices", body.accessor(indices, size_t(part.first) * 12, kUnsigned, size_t(part.count) * 3, "SCALAR")},
+             {"material", i}});
     }
     Json json{{"asset", {{"version", "2.0"}, {"generator", "Kiln " + std::string(version())}}}};
     if (strength) json["extensionsUsed"] = {"KHR_materials_emissive_strength"};

@@ -4,6 +4,7 @@
 #include "scene/world_impl.h"
 
 #include "field/mesh_facts.h"
+#include "field/mesh_simplify.h"
 #include "field/meshing.h"
 
 #include "base/format.h"
@@ -17,7 +18,7 @@ namespace kiln {
 namespace {
 
 constexpr double kMaxCells = double(1u << 25);  // of a grid: 128 MiB of cell words
-constexpr float kMargin = 3;                    // voxels of grid around what is meshed, so that nothing is cut by the grid
+constexpr float kMargin = 3;  // voxels of grid around what is meshed, so that nothing is cut by the grid
 constexpr const char* kDefaultName = "default";
 
 // The edits that make one more: everything outside the box is cut away, and what was there keeps its material.
@@ -29,10 +30,13 @@ Edit cut_to(const Box3& box) {
     return e;
 }
 
-bool positive(const Box3& box) { return box.finite() && box.min.x < box.max.x && box.min.y < box.max.y && box.min.z < box.max.z; }
+bool positive(const Box3& box) {
+    return box.finite() && box.min.x < box.max.x && box.min.y < box.max.y && box.min.z < box.max.z;
+}
 
 Error too_fine(float cell, const std::string& why) {
-    return {formatted("a mesh of cells of {} m: {}; choose larger cells or smaller bounds", cell, why), ErrorKind::OutOfMemory};
+    return {formatted("a mesh of cells of {} m: {}; choose larger cells or smaller bounds", cell, why),
+            ErrorKind::OutOfMemory};
 }
 
 // A triangle's part: the material most of its vertices have, and whether one of them has two.
@@ -42,7 +46,9 @@ struct PartKey {
     friend auto operator<=>(const PartKey&, const PartKey&) = default;
 };
 PartKey part_of(const sdf::MaterialMix& a, const sdf::MaterialMix& b, const sdf::MaterialMix& c) {
-    const uint16_t most = b.id0 == c.id0 ? b.id0 : a.id0 == b.id0 || a.id0 == c.id0 ? a.id0 : std::min({a.id0, b.id0, c.id0});
+    const uint16_t most = b.id0 == c.id0                     ? b.id0
+                          : a.id0 == b.id0 || a.id0 == c.id0 ? a.id0
+                                                             : std::min({a.id0, b.id0, c.id0});
     return {most, a.weight > 0 || b.weight > 0 || c.weight > 0};
 }
 
@@ -69,9 +75,10 @@ void compact(Mesh& mesh) {
 
 Result<Mesh> World::mesh(const MeshSettings& settings) const {
     if (!std::isfinite(settings.cell) || settings.cell < 0)
-        return Error{formatted("a mesh of cells of {} m: write a finite length above 0, or 0 for the world's voxel size",
-                               settings.cell),
-                     ErrorKind::Usage};
+        return Error{
+            formatted("a mesh of cells of {} m: write a finite length above 0, or 0 for the world's voxel size",
+                      settings.cell),
+            ErrorKind::Usage};
     if (!(settings.simplify_share > 0 && settings.simplify_share <= 1) || !(settings.simplify_error >= 0))
         return Error{"simplifying a mesh: keep a share in (0, 1], and an error of 0 or more metres", ErrorKind::Usage};
     const auto plain = impl_->compiled();
@@ -145,28 +152,34 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
         out.metallic.push_back(a.metallic * (1 - t) + b.metallic * t);
     }
 
-    std::map<PartKey, std::vector<uint32_t>> parts;
-    for (size_t t = 0; t < raw.triangles.size(); t += 3) {
-        const uint32_t* const v = raw.triangles.data() + t;
-        std::vector<uint32_t>& part = parts[part_of(surface.mixes[v[0]], surface.mixes[v[1]], surface.mixes[v[2]])];
-        part.insert(part.end(), v, v + 3);
+    std::map<PartKey, uint32_t> numbers;
+    std::vector<uint32_t> part_of_triangle;
+    std::vector<uint32_t> triangles(raw.triangles.span().begin(), raw.triangles.span().end());
+    for (size_t t = 0; t < triangles.size(); t += 3) {
+        const PartKey key =
+            part_of(surface.mixes[triangles[t]], surface.mixes[triangles[t + 1]], surface.mixes[triangles[t + 2]]);
+        part_of_triangle.push_back(numbers.try_emplace(key, uint32_t(numbers.size())).first->second);
     }
-    for (auto& [key, triangles] : parts) {
-        if (settings.simplify_share < 1 || settings.simplify_error > 0) {
-            const bool by_error = settings.simplify_share == 1;
-            const size_t target = by_error ? 0 : size_t(double(triangles.size() / 3) * double(settings.simplify_share));
-            const float error = settings.simplify_error > 0 ? settings.simplify_error : std::numeric_limits<float>::max();
-            field::simplify(out.positions, triangles, target, error, parts.size() > 1);
-        }
-        if (triangles.empty()) continue;
+    if (settings.simplify_share < 1 || settings.simplify_error > 0) {
+        field::simplify(out.positions, triangles, part_of_triangle, settings.simplify_share,
+                        settings.simplify_error > 0 ? settings.simplify_error : std::numeric_limits<float>::infinity());
+    }
+    out.triangles.reserve(triangles.size());
+    for (const auto& [key, number] : numbers) {
         MeshPart part;
-        part.name = key.material == sdf::kDefaultMaterial || key.material > named.size() ? kDefaultName
-                                                                                         : named[key.material - 1u].first;
+        part.first = uint32_t(out.triangles.size() / 3);
+        for (size_t t = 0; t < part_of_triangle.size(); ++t) {
+            if (part_of_triangle[t] != number) continue;
+            const auto at = triangles.begin() + ptrdiff_t(3 * t);
+            out.triangles.insert(out.triangles.end(), at, at + 3);
+        }
+        part.count = uint32_t(out.triangles.size() / 3) - part.first;
+        if (part.count == 0) continue;
+        part.name = key.material == sdf::kDefaultMaterial || key.material > named.size()
+                        ? kDefaultName
+                        : named[key.material - 1u].first;
         part.material = material(key.material);
         part.blended = key.blended;
-        part.first = uint32_t(out.triangles.size() / 3);
-        part.count = uint32_t(triangles.size() / 3);
-        out.triangles.insert(out.triangles.end(), triangles.begin(), triangles.end());
         out.parts.push_back(std::move(part));
     }
     compact(out);
