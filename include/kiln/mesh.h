@@ -19,8 +19,8 @@ namespace kiln {
 struct MeshSettings {
     float cell = 0;      ///< metres between samples; 0: the world's voxel size
     bool sharp = false;  ///< keeps edges and corners of shapes; else marching cubes, rounder and with smooth normals
-    std::optional<Box3> bounds;  ///< where the mesh is cut; none: the field's bounds
-    float simplify_share = 1;    ///< (0, 1]: triangles to keep, where simplify_error allows it
+    std::optional<Box3> bounds{};  ///< where the mesh is cut; none: the field's bounds
+    float simplify_share = 1;      ///< (0, 1]: triangles to keep, where simplify_error allows it
     float simplify_error = 0;  ///< metres the surface may move by simplifying; 0: any, where simplify_share is below 1
     int workers = 0;           ///< 0: all cores; the mesh does not depend on it
 };

@@ -168,9 +168,7 @@ private:
     // Whether the neighbours first in their pairs are the same as those second in them.
     bool is_ring(uint32_t v, int size) const {
         uint64_t first = 0, second = 0, firsts = 0, seconds = 0;
-        around(v, [&](uint32_t a, uint32_t b) {
-            first ^= a, second ^= b, firsts += a, seconds += b;
-        });
+        around(v, [&](uint32_t a, uint32_t b) { first ^= a, second ^= b, firsts += a, seconds += b; });
         return size >= 3 && first == second && firsts == seconds;
     }
 
@@ -215,8 +213,8 @@ private:
 
 }  // namespace
 
-void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, std::vector<uint32_t>& parts, float share,
-              float error) {
+void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, std::vector<uint32_t>& parts,
+              float share, float error) {
     // `share` is met by triangles; with all of them wanted the error alone decides.
     const size_t target = share < 1 ? size_t(double(triangles.size() / 3) * double(share)) : 0;
     Simplifier simplifier(positions, triangles, parts);

@@ -14,7 +14,7 @@ namespace kiln::field {
 /// metres (root mean square over the planes of the triangles it stands for). Vertices keep their places; some are no longer
 /// used. `parts`, a number by triangle, goes with the triangles, and borders between parts are kept like creases. A closed
 /// manifold stays one, open edges stay as they are.
-void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, std::vector<uint32_t>& parts, float share,
-              float error);
+void simplify(std::span<const vec3> positions, std::vector<uint32_t>& triangles, std::vector<uint32_t>& parts,
+              float share, float error);
 
 }  // namespace kiln::field

@@ -89,6 +89,14 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"demo potte", "did you mean potter?"},
         {"query potter", "--points"},
         {"query potter --points - --nearest", "later version"},
+        {"export potter -o a.fbx", "end the name in .glb, .obj, .stl or .ply"},
+        {"export potter -o a.glb --cell 0", "a length above 0"},
+        {"export potter -o a.glb --cell 3parsec", "a length above 0"},
+        {"export potter -o a.glb --simplify 2", "such as 0.25"},
+        {"export potter -o a.glb --simplify 2m/s", "such as 0.25"},
+        {"export potter -o -", "--format"},
+        {"export potter -o - --format fbx", "no such format"},
+        {"export potter -o a.glb --format stl", "leave --format out"},
     };
     for (const auto& [words, says] : cases) {
         const Outcome o = run(words);
@@ -102,7 +110,8 @@ TEST_F(Cli, WrongUsageIsTwo) {
 }
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
-    for (const char* verb : {"", "demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare"}) {
+    for (const char* verb :
+         {"", "demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare", "export"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;
         EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;
@@ -296,6 +305,34 @@ TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
     const Outcome o = run("render later.kiln.json -o a.png --size 16x16");
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_THAT(o.err, HasSubstr("does not draw: meshes"));
+}
+
+TEST_F(Cli, ExportWritesWholeFilesOrNone) {
+    write("ball.kiln.json", kBall);
+    const Outcome o = run("export ball.kiln.json -o ball.glb --cell 5cm --json", kNoVulkan);
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(o.out, HasSubstr("\"open_edges\": 0, \"non_manifold_edges\": 0, \"volume\": 4.1"));
+    EXPECT_THAT(o.err, HasSubstr("closed"));
+    EXPECT_THAT(files(), testing::ElementsAre("ball.glb", "ball.kiln.json"));
+    EXPECT_THAT(read(folder_ / "ball.glb"), StartsWith("glTF"));
+
+    const Outcome piped = run("export ball.kiln.json -o - --format stl --cell 0.05 -q");
+    EXPECT_EQ(piped.code, 0) << piped.err;
+    EXPECT_EQ(piped.err, "");
+    EXPECT_EQ(run("export ball.kiln.json -o ball.stl --cell 0.05 -q").code, 0);
+    EXPECT_EQ(piped.out, read(folder_ / "ball.stl"));
+
+    EXPECT_EQ(run("export ball.kiln.json -o none/ball.glb").code, 1);
+    EXPECT_EQ(run("export none.kiln.json -o a.glb").code, 3);
+    EXPECT_EQ(run("export ball.kiln.json -o a.glb --cell 1e-5").code, 5);
+    write("empty.kiln.json", "{\"format\": 1}");
+    const Outcome empty = run("export empty.kiln.json -o a.glb");
+    EXPECT_EQ(empty.code, 1);
+    EXPECT_THAT(empty.err, HasSubstr("nothing to mesh"));
+    expect_one_line(empty, "empty");
+    EXPECT_FALSE(fs::exists(folder_ / "a.glb"));
+    EXPECT_EQ(run("export ball.kiln.json -o - --format ply >/dev/full; echo $? >code").code, 0);
+    EXPECT_EQ(read(folder_ / "code"), "1\n");
 }
 
 }  // namespace

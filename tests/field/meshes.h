@@ -6,7 +6,7 @@
 #include "field/mesh.h"
 #include "field/mesh_facts.h"
 
-#include "field/worlds.h"
+#include "worlds.h"
 
 #include <cstring>
 #include <functional>

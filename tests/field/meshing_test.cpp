@@ -4,7 +4,7 @@
 #include "field/cell_cases.h"
 #include "field/mesh_edges.h"
 
-#include "field/meshes.h"
+#include "meshes.h"
 
 #include <numbers>
 
