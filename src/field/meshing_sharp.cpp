@@ -22,24 +22,23 @@ namespace {
 constexpr int kRowGrain = 2;
 constexpr uint32_t kNothing = UINT32_MAX;
 
-// What the surface is where an edge crosses it.
-struct Crossing {
-    vec3 normal;  // unit, towards the empty side; 0 where the gradient vanishes
-    float t = 0;  // along the edge, (0, 1)
-};
+typedef float float4 __attribute__((vector_size(16)));
+float4 all_of(float v) { return float4{v, v, v, v}; }
+
+// What the surface is where an edge crosses it: the normal, of unit length and towards the empty side (0 where the gradient
+// vanishes), and in the last place how far along the edge, (0, 1).
+using Crossing = float4;
+Crossing crossing(vec3 normal, float t) { return Crossing{normal.x, normal.y, normal.z, t}; }
 
 constexpr int kRootSteps = 8;
 constexpr float kRootTolerance = 1e-3f;       // voxels
 constexpr float kNewtonReach = 0.1f;          // voxels off the surface from which one step by the gradient lands on it
-constexpr float kGradientStep = 1.0f / 32;    // voxels; a float's rounding at 1000 voxels is 6e-5
+constexpr float kGradientStep = 1.0f / 40;    // voxels an axis; a float's rounding at 1000 voxels is 6e-5
 constexpr float kLeastFraction = 1.0f / 256;  // vertices stay this far inside their voxel: no two share a position
 constexpr float kStill = 0.005f;              // voxels off the surface that need no second look
 // Of the squared distances to the planes, how much is added for the distance to their middle: planes that agree leave a vertex
 // there, planes that differ by more than about 10 degrees meet where they should.
 constexpr float kMiddleWeight = 0.004f;
-
-typedef float float4 __attribute__((vector_size(16)));
-float4 all_of(float v) { return float4{v, v, v, v}; }
 
 // A crossing's place in its voxel, from the middle of the voxel: origin + t * along.
 struct EdgePlace {
@@ -243,17 +242,16 @@ public:
         }
         for (size_t i = 0; i < count; ++i) s.t[i] = fraction(s.low[i] / (s.low[i] - s.high[i]));
         Crossing* const to = crossings_.data() + edges.first_edge;
-        for (int axis = 0; axis < 3; ++axis) add_differences(axis, first[axis], first[axis + 1], count, s);
-        s.batch.count = 6 * count;
+        for (int axis = 0; axis < 3; ++axis) add_tetrahedra(axis, first[axis], first[axis + 1], count, s);
+        s.batch.count = 4 * count;
         s.batch.run(exact_, index);
         const float* const v = s.batch.value.data();
-        const float scale = per_voxel_ / (2 * kGradientStep);
+        const float scale = per_voxel_ / (4 * kGradientStep);
         for (int axis = 0; axis < 3; ++axis) {
             for (size_t i = first[axis]; i < first[size_t(axis) + 1]; ++i) {
-                const float d[6] = {
-                    v[i], v[count + i], v[2 * count + i], v[3 * count + i], v[4 * count + i], v[5 * count + i]};
-                const vec3 g{(d[0] - d[1]) * scale, (d[2] - d[3]) * scale, (d[4] - d[5]) * scale};
-                const float value = (d[2 * axis] + d[2 * axis + 1]) * 0.5f * per_voxel_;
+                const float a = v[i], b = v[count + i], c = v[2 * count + i], d = v[3 * count + i];
+                const vec3 g{((a - b) - (c - d)) * scale, ((d - a) - (b - c)) * scale, ((b - a) + (d - c)) * scale};
+                const float value = (a + b + c + d) * 0.25f * per_voxel_;
                 const float slope = axis == 0 ? g.x : axis == 1 ? g.y : g.z;
                 const float size = length(g);
                 const float step = value / slope;
@@ -261,7 +259,7 @@ public:
                     s.open.push_back(uint32_t(i));
                     continue;
                 }
-                to[i] = {g / size, fraction(s.t[i] - step)};
+                to[i] = crossing(g / size, fraction(s.t[i] - step));
             }
         }
         if (!s.open.empty()) cross_hard(index, first, s, to);
@@ -320,8 +318,8 @@ public:
                     const uint32_t* const q = around_.data() + 4 * size_t(e);
                     const bool forward = low_is_solid != (axis == 1);
                     const uint32_t ring[4] = {q[0], forward ? q[1] : q[2], q[3], forward ? q[2] : q[1]};
-                    const int first =
-                        diagonal(ring, world(index, z * 64 + bit, on_edge(axis, crossings_[e].t)), crossings_[e]);
+                    const vec3 middle = world(index, z * 64 + bit, on_edge(axis, crossings_[e][3]));
+                    const int first = diagonal(ring, middle, axis, low_is_solid, crossings_[e]);
                     for (const int corner : {0, 1, 2, 0, 2, 3}) *to++ = ring[(first + corner) & 3];
                 }
             }
@@ -349,11 +347,13 @@ private:
         return q[0] != kNothing && q[1] != kNothing && q[2] != kNothing && q[3] != kNothing;
     }
 
-    // Six points around each of the edges first … end - 1 of one axis, in six runs of `count`.
-    void add_differences(int axis, size_t first, size_t end, size_t count, Scratch& s) const {
+    // Corners of a tetrahedron around each of the edges first … end - 1 of one axis, in four runs of `count`: a
+    // value and a gradient for four evaluations, the gradient off by the step times the curvature.
+    void add_tetrahedra(int axis, size_t first, size_t end, size_t count, Scratch& s) const {
+        constexpr vec3 kCorner[4] = {{1, -1, -1}, {-1, -1, 1}, {-1, 1, -1}, {1, 1, 1}};
         const vec3 unit = on_edge(axis, 1);
-        for (size_t i = 0; i < 6; ++i) {
-            const vec3 step = on_edge(int(i / 2), i % 2 == 0 ? kGradientStep : -kGradientStep);
+        for (size_t i = 0; i < 4; ++i) {
+            const vec3 step = kCorner[i] * kGradientStep;
             float* const x = s.batch.x.data() + i * count;
             float* const y = s.batch.y.data() + i * count;
             float* const z = s.batch.z.data() + i * count;
@@ -416,7 +416,7 @@ private:
             const float* const v = s.batch.value.data() + 6 * i;
             const vec3 g{v[0] - v[1], v[2] - v[3], v[4] - v[5]};
             const float size = length(g);
-            to[all[i].edge] = {size > 1e-3f * kGradientStep * h_ ? g / size : vec3{}, s.t[all[i].edge]};
+            to[all[i].edge] = crossing(size > 1e-3f * kGradientStep * h_ ? g / size : vec3{}, s.t[all[i].edge]);
         }
     }
 
@@ -432,8 +432,7 @@ private:
     void meet(const uint8_t* begin, const uint8_t* end, const uint32_t* from, Sheet& sheet) const {
         float4 middle{}, normal{}, right{}, row_x{}, row_y{}, row_z{};
         for (const uint8_t* edge = begin; edge != end; ++edge) {
-            float4 n;
-            std::memcpy(&n, &crossings_[from[kEdgeOffset[*edge]]], sizeof n);
+            const float4 n = crossings_[from[kEdgeOffset[*edge]]];
             const EdgePlace& place = kEdgePlace[*edge];
             const float4 p = place.origin + place.along * all_of(n[3]);
             middle += p;
@@ -476,7 +475,7 @@ private:
         for (int i = loops.first[sheet.loop]; i < loops.first[sheet.loop + 1]; ++i) {
             const EdgePlace& place = kEdgePlace[loops.edges[i]];
             const float4 p =
-                place.origin + place.along * all_of(crossings_[numbers[sheet.voxel + kEdgeOffset[loops.edges[i]]]].t);
+                place.origin + place.along * all_of(crossings_[numbers[sheet.voxel + kEdgeOffset[loops.edges[i]]]][3]);
             points[count] = {p[0] + 0.5f, p[1] + 0.5f, p[2] + 0.5f};
             middle = middle + points[count++];
         }
@@ -536,17 +535,24 @@ private:
     }
 
     // Corner that the quad's diagonal starts from. The surface passes the quad's edge at the crossing: the diagonal nearer to it
-    // lies along a crease. A diagonal that turns a triangle over comes last.
-    int diagonal(const uint32_t (&ring)[4], vec3 middle, const Crossing& c) const {
-        vec3 p[4];
-        for (size_t i = 0; i < 4; ++i) p[i] = (out_.positions[ring[i]] - middle) * per_voxel_;
-        float cost[2];
-        for (size_t first = 0; first < 2; ++first) {
-            const vec3 &a = p[first], &b = p[first + 1], &d = p[first + 2], &e = p[(first + 3) & 3];
-            cost[first] = std::fabs(dot(c.normal, a + d)) * 0.5f;
-            if (dot(kiln::cross(b - a, d - a), c.normal) < 0) cost[first] += 4;
-            if (dot(kiln::cross(d - a, e - a), c.normal) < 0) cost[first] += 4;
+    // lies along a crease. One that turns a triangle over, as seen along the edge, comes last.
+    int diagonal(const uint32_t (&ring)[4], vec3 middle, int axis, bool towards_high, const Crossing& c) const {
+        const vec3 normal{c[0], c[1], c[2]};
+        float u[4], v[4], height[4];
+        for (size_t i = 0; i < 4; ++i) {
+            const vec3 p = out_.positions[ring[i]] - middle;
+            height[i] = dot(p, normal);
+            u[i] = axis == 0 ? p.y : axis == 1 ? p.z : p.x;
+            v[i] = axis == 0 ? p.z : axis == 1 ? p.x : p.y;
         }
+        const auto area = [&](int i, int j, int k) {
+            const float doubled = (u[j] - u[i]) * (v[k] - v[i]) - (v[j] - v[i]) * (u[k] - u[i]);
+            return towards_high ? doubled : -doubled;
+        };
+        const float turned = 4 * h_;
+        float cost[2] = {std::fabs(height[0] + height[2]), std::fabs(height[1] + height[3])};
+        if (std::min(area(0, 1, 2), area(0, 2, 3)) < 0) cost[0] += turned;
+        if (std::min(area(1, 2, 3), area(1, 3, 0)) < 0) cost[1] += turned;
         return cost[1] < cost[0] ? 1 : 0;
     }
 

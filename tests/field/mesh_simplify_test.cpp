@@ -40,7 +40,7 @@ TEST(MeshSimplify, ErrorBoundsHowFarTheSurfaceMoves) {
     const float h = ball.options.voxel_size, radius = 16 * h;
     Lists mesh = lists_of(ball);
     const size_t before = mesh.triangles.size();
-    const float error = 0.02f * h;
+    const float error = 0.05f * h;
     simplify(mesh.positions, mesh.triangles, mesh.parts, 1, error);
     EXPECT_LT(mesh.triangles.size(), before / 2);
     const vec3 center = vec3{0.3f, -0.2f, 0.4f} * h;
@@ -48,7 +48,8 @@ TEST(MeshSimplify, ErrorBoundsHowFarTheSurfaceMoves) {
         const vec3 middle = (mesh.positions[mesh.triangles[t]] + mesh.positions[mesh.triangles[t + 1]] +
                              mesh.positions[mesh.triangles[t + 2]]) /
                             3.0f;
-        EXPECT_NEAR(length(middle - center), radius, 4 * error + 0.03f * h);  // root mean square, not the most; and chords
+        EXPECT_NEAR(length(middle - center), radius,
+                    4 * error + 0.03f * h);  // root mean square, not the most; and chords
     }
 }
 
@@ -76,7 +77,9 @@ TEST(MeshSimplify, BordersBetweenPartsStayStraight) {
 }
 
 TEST(MeshSimplify, OpenEdgesStay) {
-    Lists mesh{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 0}}, {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4}, {0, 0, 0, 0}};
+    Lists mesh{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0.5f, 0.5f, 0}},
+               {0, 1, 4, 1, 2, 4, 2, 3, 4, 3, 0, 4},
+               {0, 0, 0, 0}};
     simplify(mesh.positions, mesh.triangles, mesh.parts, 0.1f, std::numeric_limits<float>::infinity());
     EXPECT_EQ(mesh_facts(mesh.positions, mesh.triangles).open_edges, 4u);
 }

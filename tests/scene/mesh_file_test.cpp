@@ -174,7 +174,8 @@ TEST(WorldMesh, SeamsAreTheirOwnPartsAndColoursFollowTheBlend) {
 
 TEST(WorldMesh, SimplifiedWorldsStayClosed) {
     const World world = world_of(kSeam);
-    const Mesh whole = mesh_of(world), tenth = mesh_of(world, {.simplify_share = 0.1f}), near = mesh_of(world, {.simplify_error = 0.002f});
+    const Mesh whole = mesh_of(world), tenth = mesh_of(world, {.simplify_share = 0.1f}),
+               near = mesh_of(world, {.simplify_error = 0.002f});
     expect_closed(tenth, "a tenth");
     expect_closed(near, "within 2 mm");
     EXPECT_NEAR(double(tenth.triangles.size()), 0.1 * double(whole.triangles.size()), 6);
@@ -256,8 +257,7 @@ void check_glb(const std::string& bytes, const Mesh& mesh) {
         }
         if (primitive["attributes"].contains("NORMAL")) {
             const auto n = floats(json["accessors"].at(primitive["attributes"]["NORMAL"].get<size_t>()));
-            for (size_t i = 0; i < n.size(); i += 3)
-                EXPECT_NEAR(std::hypot(n[i], n[i + 1], n[i + 2]), 1, 1e-4);
+            for (size_t i = 0; i < n.size(); i += 3) EXPECT_NEAR(std::hypot(n[i], n[i + 1], n[i + 2]), 1, 1e-4);
         }
         for (const auto& e : material.value("emissiveFactor", std::vector<float>{})) EXPECT_LE(e, 1);
     }
