@@ -14,13 +14,13 @@
 namespace kiln::bench {
 namespace {
 
-std::shared_ptr<const field::Field> field_of(int kind) {
+field::HostBricks bricks_of(int kind) {
     field::FieldOptions options;
     options.voxel_size = 2.0f / 256;
     options.bounds = {{-1, -1, -1}, {1, 1, 1}};
     options.workers = 1;
     const std::vector<Edit> edits = recipe(kind, 5, 1000);
-    return *field::Field::build(std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}})), options);
+    return *field::HostBricks::build(std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}})), options);
 }
 
 void report(benchmark::State& state, const field::Field& field, const field::Mesh& mesh) {
@@ -42,28 +42,26 @@ void report(benchmark::State& state, const field::Field& field, const field::Mes
 
 // Memory of the mesh is fresh each time, or kept.
 void mesh_smooth(benchmark::State& state) {
-    const auto field = field_of(int(state.range(0)));
-    const field::HostBricks bricks = field::HostBricks::bake(field, 1);
+    const field::HostBricks bricks = bricks_of(int(state.range(0)));
     const bool keep = state.range(1) != 0;
     field::Mesh mesh;
     for (auto _ : state) {
         if (!keep) mesh = {};
         field::mesh_smooth(field::MeshBricks(bricks), mesh, 1);
     }
-    report(state, *field, mesh);
+    report(state, bricks.field(), mesh);
 }
 BENCHMARK(mesh_smooth)->ArgNames({"kind", "keep"})->ArgsProduct({{0, 1, 2}, {0, 1}})->Unit(benchmark::kMillisecond);
 
 void mesh_sharp(benchmark::State& state) {
-    const auto field = field_of(int(state.range(0)));
-    const field::HostBricks host = field::HostBricks::bake(field, 1);
+    const field::HostBricks host = bricks_of(int(state.range(0)));
     field::Mesh mesh;
     for (auto _ : state) {
         mesh = {};
         const field::MeshBricks bricks(host);
         field::mesh_sharp(bricks, field::exact_of(host, bricks), mesh, 1);
     }
-    report(state, *field, mesh);
+    report(state, host.field(), mesh);
 }
 BENCHMARK(mesh_sharp)->ArgName("kind")->DenseRange(0, 2)->Unit(benchmark::kMillisecond);
 

@@ -6,21 +6,22 @@
 namespace kiln::field {
 namespace {
 
+const std::byte* codes_of(const BrickContent& content) {
+    return content.half ? std::as_bytes(std::span(*content.half)).data()
+                        : std::as_bytes(std::span(*content.bytes)).data();
+}
+
 std::vector<MeshBrick> bricks_of(const HostBricks& host, const MeshRegion* region) {
-    const std::span<const BrickRecord> records = host.field().records();
-    const size_t bytes = size_t(kBrickTexelCount) * size_t(host.texel_bytes());
-    const std::byte* const codes = host.distances().data();
+    const Field& field = host.field();
     std::vector<MeshBrick> out;
-    out.reserve(region != nullptr ? 0 : records.size());
-    for (uint32_t slot = 0; slot < records.size(); ++slot) {
-        const BrickRecord& r = records[slot];
-        if (r.code_count == 0) continue;
+    for (const uint32_t slot : field.slots()) {
+        const BrickRecord& r = field.records()[slot];
         const ivec3 cell{r.texel_x / kBrickVoxels, r.texel_y / kBrickVoxels, r.texel_z / kBrickVoxels};
         if (region != nullptr && (cell.x < region->min.x || cell.y < region->min.y || cell.z < region->min.z ||
                                   cell.x >= region->max.x || cell.y >= region->max.y || cell.z >= region->max.z)) {
             continue;
         }
-        out.push_back({cell, slot, codes + slot * bytes});
+        out.push_back({cell, slot, codes_of(host.content(slot))});
     }
     return out;
 }

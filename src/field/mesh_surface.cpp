@@ -27,9 +27,8 @@ MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const M
         };
         const sdf::Points at{x, y, z, int(count)};
         fill({});
-        const BrickRecord& record = field.records()[bricks.bricks()[brick].slot];
-        sdf::evaluate_materials(sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)),
-                                at, value, out.mixes.data() + first);
+        sdf::evaluate_materials(sdf::view(field.program(), field.code_of(bricks.bricks()[brick].slot)), at, value,
+                                out.mixes.data() + first);
         if (!normals) return;
         float slopes[3][kMost];
         for (int axis = 0; axis < 3; ++axis) {

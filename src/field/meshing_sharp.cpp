@@ -570,9 +570,7 @@ private:
 ExactBrick exact_of(const HostBricks& host, const MeshBricks& bricks) {
     return [&host, &bricks](size_t brick, const sdf::Points& points, float* out) {
         const Field& field = host.field();
-        const BrickRecord& record = field.records()[bricks.bricks()[brick].slot];
-        sdf::evaluate(sdf::view(field.program(), field.code().subspan(record.code_first, record.code_count)), points,
-                      out);
+        sdf::evaluate(sdf::view(field.program(), field.code_of(bricks.bricks()[brick].slot)), points, out);
     };
 }
 

@@ -81,20 +81,19 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
             ErrorKind::Usage};
     if (!(settings.simplify_share > 0 && settings.simplify_share <= 1) || !(settings.simplify_error >= 0))
         return Error{"simplifying a mesh: keep a share in (0, 1], and an error of 0 or more metres", ErrorKind::Usage};
-    const auto plain = impl_->compiled();
-    if (!plain) return plain.error();
-    const Impl::Resolution r = impl_->resolution(**plain, field_settings);
+    std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    const Impl::Resolution r = impl_->resolution(*program, field_settings);
     const Box3 bounds = settings.bounds.value_or(r.bounds);
     if (!positive(bounds)) return Error{"a mesh's bounds must be finite, with min below max", ErrorKind::Usage};
     const float cell = settings.cell > 0 ? settings.cell : r.voxel_size;
 
     // Smooth unions bulge beyond the solids' own bounds by at most a quarter of the blend radius.
     float reach = 0;
-    for (const sdf::EditSpan& edit : (*plain)->edits) reach = std::max(reach, edit.reach);
-    const Box3 solid = (*plain)->bounds.inflated(reach);
-    const bool within = !(*plain)->unbounded && bounds.contains(solid.min) && bounds.contains(solid.max);
-    std::shared_ptr<const sdf::Program> program = *plain;
-    if (!within && !(*plain)->edits.empty()) {
+    const std::vector<uint32_t> rows = program->rows();
+    for (const uint32_t row : rows) reach = std::max(reach, program->edits[row].reach);
+    const Box3 solid = program->bounds.inflated(reach);
+    const bool within = !program->unbounded && bounds.contains(solid.min) && bounds.contains(solid.max);
+    if (!within && !rows.empty()) {
         std::vector<Edit> edits = impl_->data.edits;
         edits.push_back(cut_to(bounds));
         const std::lock_guard lock(impl_->mutex);
@@ -109,17 +108,17 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
     options.voxel_size = cell;
     options.bounds = (within ? box_intersection(bounds, solid) : bounds).inflated(kMargin * cell);
     options.workers = settings.workers;
-    if ((*plain)->edits.empty() || !positive(options.bounds))
+    if (rows.empty() || !positive(options.bounds))
         return Error{"there is nothing to mesh: the world has no edits", ErrorKind::Failed};
     const vec3 size = (options.bounds.max - options.bounds.min) / (cell * float(field::kBrickVoxels));
     if ((double(size.x) + 2) * (double(size.y) + 2) * (double(size.z) + 2) > kMaxCells)
         return too_fine(cell, "the grid does not fit");
-    const auto made_field = field::Field::build(program, options);
-    if (!made_field) {
-        if (made_field.error().kind == ErrorKind::OutOfMemory) return too_fine(cell, made_field.error().message);
-        return made_field.error();
+    const auto built = field::HostBricks::build(program, options);
+    if (!built) {
+        if (built.error().kind == ErrorKind::OutOfMemory) return too_fine(cell, built.error().message);
+        return built.error();
     }
-    const field::HostBricks host = field::HostBricks::bake(*made_field, settings.workers);
+    const field::HostBricks& host = *built;
     const field::MeshBricks bricks(host);
     field::Mesh raw;
     if (settings.sharp)
