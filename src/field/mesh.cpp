@@ -11,17 +11,30 @@ const std::byte* codes_of(const BrickContent& content) {
                         : std::as_bytes(std::span(*content.bytes)).data();
 }
 
-std::vector<MeshBrick> bricks_of(const HostBricks& host, const MeshRegion* region) {
+std::vector<MeshBrick> bricks_of(const HostBricks& host) {
     const Field& field = host.field();
     std::vector<MeshBrick> out;
     for (const uint32_t slot : field.slots()) {
         const BrickRecord& r = field.records()[slot];
         const ivec3 cell{r.texel_x / kBrickVoxels, r.texel_y / kBrickVoxels, r.texel_z / kBrickVoxels};
-        if (region != nullptr && (cell.x < region->min.x || cell.y < region->min.y || cell.z < region->min.z ||
-                                  cell.x >= region->max.x || cell.y >= region->max.y || cell.z >= region->max.z)) {
-            continue;
-        }
         out.push_back({cell, slot, codes_of(host.content(slot))});
+    }
+    return out;
+}
+
+// By cell, so that a small region costs little in a large field.
+std::vector<MeshBrick> bricks_of(const HostBricks& host, const MeshRegion& region) {
+    const GridParams g = host.field().grid();
+    std::vector<MeshBrick> out;
+    for (int z = std::max(region.min.z, g.cell_z); z < std::min(region.max.z, g.cell_z + g.size_z); ++z) {
+        for (int y = std::max(region.min.y, g.cell_y); y < std::min(region.max.y, g.cell_y + g.size_y); ++y) {
+            for (int x = std::max(region.min.x, g.cell_x); x < std::min(region.max.x, g.cell_x + g.size_x); ++x) {
+                const uint32_t word = host.field().cell_word(x, y, z);
+                if ((word & kCellOccupied) == 0) continue;
+                const uint32_t slot = word & kCellSlotMask;
+                out.push_back({{x, y, z}, slot, codes_of(host.content(slot))});
+            }
+        }
     }
     return out;
 }
@@ -40,14 +53,14 @@ void sort_by(std::vector<MeshBrick>& bricks, std::vector<MeshBrick>& spare, int 
 }  // namespace
 
 MeshBricks::MeshBricks(const HostBricks& bricks)
-    : bricks_(bricks_of(bricks, nullptr)),
+    : bricks_(bricks_of(bricks)),
       format_(bricks.field().options().format),
       voxel_size_(bricks.field().grid().voxel_size) {
     index();
 }
 
 MeshBricks::MeshBricks(const HostBricks& bricks, const MeshRegion& region)
-    : bricks_(bricks_of(bricks, &region)),
+    : bricks_(bricks_of(bricks, region)),
       format_(bricks.field().options().format),
       voxel_size_(bricks.field().grid().voxel_size) {
     index();
