@@ -456,10 +456,43 @@ private:
         const float4 at =
             middle +
             (column_x * all_of(right[0]) + column_y * all_of(right[1]) + column_z * all_of(right[2])) * all_of(scale);
-        sheet.at = inside({at[0] + 0.5f, at[1] + 0.5f, at[2] + 0.5f});
+        const float most = 0.5f - kLeastFraction;
+        const bool out = std::max({std::fabs(at[0]), std::fabs(at[1]), std::fabs(at[2])}) > most;
+        const float rows[3][3] = {{xx, xy, xz}, {xy, yy, yz}, {xz, yz, zz}};
+        const vec3 p = out ? nearest_inside(rows, right, middle, at) : vec3{at[0], at[1], at[2]};
+        sheet.at = inside({p.x + 0.5f, p.y + 0.5f, p.z + 0.5f});
         const vec3 n{normal[0], normal[1], normal[2]};
         const float size = length(n);
         sheet.normal = size > 0 ? n / size : vec3{};
+    }
+    // The least squares again with the coordinate that is furthest out held at the voxel's face: along a crease that leaves through
+    // another side the vertex slides on the crease, where clamping alone would push it off. `free` may be outside.
+    static vec3 nearest_inside(const float (&rows)[3][3], float4 right, float4 middle, float4 free) {
+        const float most = 0.5f - kLeastFraction;
+        const auto held = [&](float v) { return std::min(std::max(v, -most), most); };
+        const auto furthest = [&](const float* v, size_t count) {
+            size_t best = 0;
+            for (size_t i = 1; i < count; ++i)
+                if (std::fabs(v[i]) > std::fabs(v[best])) best = i;
+            return best;
+        };
+        float at[3] = {free[0], free[1], free[2]};
+        const size_t k = furthest(at, 3), i = k == 0 ? 1 : 0, j = k == 2 ? 1 : 2;
+        at[k] = held(at[k]);
+        const float x_k = at[k] - middle[int(k)];
+        const float r_i = right[int(i)] - rows[i][k] * x_k, r_j = right[int(j)] - rows[j][k] * x_k;
+        const float scale = 1 / (rows[i][i] * rows[j][j] - rows[i][j] * rows[i][j]);
+        at[i] = middle[int(i)] + scale * (rows[j][j] * r_i - rows[i][j] * r_j);
+        at[j] = middle[int(j)] + scale * (rows[i][i] * r_j - rows[i][j] * r_i);
+        if (std::max(std::fabs(at[i]), std::fabs(at[j])) > most) {
+            const bool first = std::fabs(at[i]) > std::fabs(at[j]);
+            const size_t second = first ? i : j, last = first ? j : i;
+            at[second] = held(at[second]);
+            const float x = at[second] - middle[int(second)];
+            at[last] = middle[int(last)] +
+                       (right[int(last)] - rows[last][k] * x_k - rows[last][second] * x) / rows[last][last];
+        }
+        return {at[0], at[1], at[2]};
     }
     static vec3 inside(vec3 p) { return {fraction(p.x), fraction(p.y), fraction(p.z)}; }
 
