@@ -67,8 +67,8 @@ struct Voxel {
 // 2013, shows the same for dual marching cubes with one ambiguous face a voxel.
 class Flips {
 public:
-    explicit Flips(const MeshEdges& edges, int workers) : edges_(edges) {
-        const size_t count = edges.bricks().bricks().size();
+    Flips(const MeshEdges& edges, int workers) : edges_(edges), in_brick_(edges.bricks().bricks().size()) {
+        const size_t count = in_brick_.size();
         std::vector<std::vector<Candidate>> found(count);
         parallel_for(
             count, workers, [&](int brick) { find(size_t(brick), found[size_t(brick)]); }, 64);
@@ -77,7 +77,7 @@ public:
     }
 
     uint32_t at(size_t brick, int z, int bit) const {
-        if (flipped_.empty()) return 0;
+        if (!in_brick_[brick]) return 0;
         const auto it = flipped_.find(key(brick, z, bit));
         return it == flipped_.end() ? 0 : it->second;
     }
@@ -149,6 +149,7 @@ private:
             !one_loop(cell_loops(signs(other), theirs), c.face ^ 1)) {
             return;
         }
+        in_brick_[c.voxel.brick] = in_brick_[other.brick] = true;
         mine |= 1u << c.face;
         theirs |= 1u << (c.face ^ 1);
     }
@@ -164,6 +165,7 @@ private:
     }
 
     const MeshEdges& edges_;
+    std::vector<bool> in_brick_;  // by brick: some of its voxels are in flipped_
     std::unordered_map<uint64_t, uint32_t> flipped_;
 };
 
@@ -333,7 +335,10 @@ private:
         std::memcpy(&code, codes + 2 * texel, 2);
         return half_value(code);
     }
-    static float fraction(float t) { return std::min(std::max(t, kLeastFraction), 1 - kLeastFraction); }
+    static float fraction(float t) {
+        t = t > kLeastFraction ? t : kLeastFraction;
+        return t < 1 - kLeastFraction ? t : 1 - kLeastFraction;
+    }
     static vec3 on_edge(int axis, float t) { return {axis == 0 ? t : 0, axis == 1 ? t : 0, axis == 2 ? t : 0}; }
     vec3 world(vec3 texel, vec3 p) const { return {(texel.x + p.x) * h_, (texel.y + p.y) * h_, (texel.z + p.z) * h_}; }
     vec3 world(size_t brick, int texel, vec3 p) const {
@@ -423,7 +428,7 @@ private:
     const CellLoops& loops_of(size_t index, int voxel, CellLoops& flipped) const {
         const uint32_t signs = corner_signs(edges_[index].solid, voxel >> 6, voxel & 63);
         const uint32_t faces = flips_.at(index, voxel >> 6, voxel & 63);
-        if (faces == 0) return cell_tables().loops[signs];
+        if (faces == 0) return loops_[signs];
         flipped = cell_loops(signs, faces);
         return flipped;
     }
@@ -595,6 +600,7 @@ private:
     Mesh& out_;
     Buffer<Crossing>& crossings_;
     Buffer<uint32_t>& around_;  // by edge: the vertices of the voxels around it, at (e & 3) of their edges
+    const std::array<CellLoops, 256>& loops_ = cell_tables().loops;
     const float h_, per_voxel_;
 };
 
