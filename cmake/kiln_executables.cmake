@@ -34,7 +34,7 @@ function(kiln_samples)
 endfunction()
 
 # tests/X/*_test.cpp (and helpers beside them) -> X_tests, run as X.Suite.Name. Suites named *Gpu* get the label gpu, *Slow* slow,
-# the others unit. Shaders in the folder are embedded as those of modules are.
+# *SlowGpu* slow-gpu (ctest matches labels as regular expressions: it is both), the others unit. Shaders in the folder are embedded as those of modules are.
 function(kiln_tests)
     find_package(GTest REQUIRED)
     find_package(rapidcheck REQUIRED)
@@ -77,12 +77,16 @@ function(kiln_tests)
             add_dependencies(${target} ${apps})
         endif()
         kiln_shaders(${name} FOLDER ${folder} TARGET ${target})
-        foreach(part "gpu:*Gpu*" "slow:*Slow*-*Gpu*" "unit:-*Gpu*:*Slow*")
-            string(REGEX MATCH "^([a-z]+):(.*)$" part "${part}")
+        foreach(part "gpu:*Gpu*-*SlowGpu*" "slow:*Slow*-*Gpu*" "slow-gpu:*SlowGpu*" "unit:-*Gpu*:*Slow*")
+            string(REGEX MATCH "^([a-z-]+):(.*)$" part "${part}")
             set(label ${CMAKE_MATCH_1})
             set(filter ${CMAKE_MATCH_2})
+            set(limit 300)
+            if(label MATCHES "slow")
+                set(limit 1500)
+            endif()
             gtest_discover_tests(${target} TEST_FILTER "${filter}" TEST_PREFIX "${name}." TEST_LIST ${target}_${label}
-                DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT 300)
+                DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT ${limit})
         endforeach()
     endforeach()
     kiln_shader_checks()
