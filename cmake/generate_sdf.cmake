@@ -199,6 +199,7 @@ function(kiln_generate_sdf)
     set(glsl_point)
     set(glsl_value)
     set(glsl_copies)
+    set(cpp_second)
     set(cpp_warp_bounds)
     set(cpp_warp_lipschitz)
     set(kind 0)
@@ -216,6 +217,7 @@ function(kiln_generate_sdf)
             string(APPEND glsl_value "    case ${kind}u: if (KILN_USES_WARP(${kind}u)) return value_${name}(d, p, ${type}(${t_glsl})); break;\n")
         else()
             string(APPEND cpp_copies "    case ${kind}: return copy_${name}(p, ${type}{${t_load}}, middle, second);\n")
+            string(APPEND cpp_second "    case ${kind}: return second_${name}(${type}{${t_load}}, region);\n")
             string(APPEND glsl_copies "    case ${kind}u: if (KILN_USES_WARP(${kind}u)) return copy_${name}(p, ${type}(${t_glsl}), middle, second); break;\n")
         endif()
         string(APPEND cpp_warp_bounds "    case ${kind}: return bounds_${name}(${type}{${t_load}}, child);\n")
@@ -309,6 +311,11 @@ KILN_SDF Bounds warp_bounds(uint32_t kind, const float* w, Bounds child) {
     switch (kind) {
 ${cpp_warp_bounds}    }
     __builtin_unreachable();
+}
+KILN_SDF param3 second_copies(uint32_t kind, const float* w, Bounds region) {
+    switch (kind) {
+${cpp_second}    }
+    return param3(0.0f, 0.0f, 0.0f);
 }
 KILN_SDF param warp_lipschitz(uint32_t kind, const float* w, Bounds region) {
     switch (kind) {

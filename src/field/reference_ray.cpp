@@ -118,6 +118,17 @@ double bisect(const Voxel& voxel, const Line& line, double low, double high) {
     return high;
 }
 
+// Speed through the lattice plane that the line is on at t.
+double through_face(const Line& line, double t) {
+    const std::array<double, 3> p = line.at(t);
+    double nearest = 1, speed = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const double off = std::fabs(p[axis] - std::round(p[axis]));
+        if (off < nearest) nearest = off, speed = std::fabs(line.direction[axis]);
+    }
+    return speed;
+}
+
 }  // namespace
 
 ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double t_max) {
@@ -182,6 +193,10 @@ ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double
                 if (hit.state == kMarchMiss && value <= 0) {
                     hit.state = kMarchHit;
                     hit.t = i == 0 ? cuts[0] : bisect(voxel, line, cuts[size_t(i - 1)], cuts[size_t(i)]);
+                    hit.slope =
+                        i == 0 && a == enter
+                            ? through_face(line, a)
+                            : std::fabs(voxel.at(line.at(hit.t - 1e-5)) - voxel.at(line.at(hit.t + 1e-5))) / 2e-5;
                 }
                 if (hit.state == kMarchHit && (done || value < -1e-2)) return true;
             }

@@ -13,6 +13,9 @@ struct ReferenceHit {
     /// Least |value| (voxels) where the value along the ray stops falling: before the hit, and once more after it. Near 0 the ray is
     /// tangent, and hit or miss is a matter of rounding.
     double least = 1e30;
+    /// How fast the value falls at the hit, per voxel of t; where the ray is in solid as it enters the grid, its speed through that face.
+    /// What is off by e along the ray is off by slope · e across the surface.
+    double slope = 1;
 };
 
 ReferenceHit reference_ray(const HostBricks& bricks, const TexelRay& ray, double t_max);

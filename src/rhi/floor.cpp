@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The floor as a check on one shader, and the bind group layouts that a pipeline's shaders ask for.
+#include "rhi/binding_counts.h"
 #include "rhi/spirv_reflect.h"
 
 #include <algorithm>
@@ -32,30 +33,13 @@ std::vector<std::string> check_floor(const Reflection& r, const Caps& caps) {
         if (is > most)
             out.push_back(std::string(what) + ": " + std::to_string(is) + ", the floor is " + std::to_string(most));
     };
-    uint32_t storage_buffers = 0, storage_textures = 0, sampled = 0, samplers = 0, uniforms = 0;
+    BindingCounts counts;
     for (const ReflectedBinding& b : r.bindings) {
         at_most(b.set + 1ull, kMaxBindGroups, "bind groups");
         if (b.array_count != 1 && !caps.bindless) out.push_back("binding '" + b.name + "' is an array of resources");
-        switch (b.kind) {
-        case BindingKind::UniformBuffer:
-            ++uniforms;
+        counts.add(b.kind);
+        if (b.kind == BindingKind::UniformBuffer)
             at_most(b.block_size, kMaxUniformBinding, "bytes of uniform block '" + b.name + "'");
-            break;
-        case BindingKind::StorageBuffer:
-        case BindingKind::StorageBufferReadOnly:
-            ++storage_buffers;
-            break;
-        case BindingKind::SampledTexture:
-            ++sampled;
-            break;
-        case BindingKind::Sampler:
-            ++samplers;
-            break;
-        case BindingKind::StorageTexture:
-        case BindingKind::StorageTextureReadOnly:
-            ++storage_textures;
-            break;
-        }
         if (!is_storage_texture(b)) continue;
         if (b.format == Format::Undefined) {
             out.push_back("storage texture '" + b.name + "' has no format that the engine knows");
@@ -68,11 +52,7 @@ std::vector<std::string> check_floor(const Reflection& r, const Caps& caps) {
                           " (declare it writeonly or readonly)");
         }
     }
-    at_most(storage_buffers, kMaxStorageBuffersPerStage, "storage buffers");
-    at_most(storage_textures, kMaxStorageTexturesPerStage, "storage textures");
-    at_most(sampled, kMaxSampledTexturesPerStage, "sampled textures");
-    at_most(samplers, kMaxSamplersPerStage, "samplers");
-    at_most(uniforms, kMaxUniformBuffersPerStage, "uniform buffers");
+    for (const BindingCounts::Row& row : counts.rows()) at_most(row.is, row.most, row.what);
     at_most(r.push_bytes, kMaxPushBytes, "bytes of push data");
     at_most(uint64_t{r.workgroup[0]} * r.workgroup[1] * r.workgroup[2], kMaxWorkgroupThreads, "threads a workgroup");
     at_most(r.shared_bytes, kMaxWorkgroupShared, "bytes of workgroup memory");

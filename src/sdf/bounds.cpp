@@ -47,6 +47,11 @@ float warp_lipschitz(const Warp& warp, const Box3& region) {
     return l >= 1.0f ? l : (l < 1.0f ? 1.0f : std::numeric_limits<float>::infinity());  // NaN: unbounded region
 }
 
+vec3 second_copies(const Warp& warp, const Box3& region) {
+    const host::param3 s = host::second_copies(warp.kind, warp.params.data(), to_host(region));
+    return {s.x, s.y, s.z};
+}
+
 Box3 transformed_box(const Box3& box, const Transform& transform) {
     const float lo[3] = {box.min.x, box.min.y, box.min.z};
     const float hi[3] = {box.max.x, box.max.y, box.max.z};

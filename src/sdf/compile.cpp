@@ -214,23 +214,13 @@ private:
             const Warp& warp = task.node->domain[i];
             const Box3& solid = task.bounds->stages[i + 1];
             const KindRow::How how = warp_rows()[warp.kind].how;
+            const EntryFactor& factor = task.bounds->factors[i];
+            if (factor.bounded) add_bound(task, flush(task.chain, task.pending), solid, factor.margin);
+            task.scale /= double(factor.lipschitz);
             if (how == KindRow::Copies) {
-                expand_copies(task, warp, task.bounds->stages[i]);
+                expand_copies(task, warp, task.bounds->stages[i], factor);
                 return;
             }
-            const EntryFactor factor = entry_factor(warp, solid);
-            if (factor.bounded) {
-                const uint32_t chain = flush(task.chain, task.pending);
-                add_bound(task, chain, solid, factor.margin);
-                if (how == KindRow::Point) {
-                    const Box3 wide = solid.inflated(factor.margin);
-                    task.chain =
-                        add_step(chain, Opcode::PointClamp, 0,
-                                 add_params({wide.min.x, wide.min.y, wide.min.z, wide.max.x, wide.max.y, wide.max.z}));
-                    task.pending = {};
-                }
-            }
-            task.scale /= double(factor.lipschitz);
             if (how == KindRow::Point) {
                 task.chain = add_step(flush(task.chain, task.pending), Opcode::PointWarp, warp.kind,
                                       add_params({}, warp.params));
@@ -248,8 +238,7 @@ private:
         expand_content(task);
     }
 
-    // R = max(min(R, m), signed distance(p, box)). The solid lies in the box, so inside it the box's distance never wins; outside
-    // it takes over where the child's factor is no longer proven.
+    // R = max(min(R, m), signed distance(p, box)): resolve.cpp proves it.
     void add_bound(Task& task, uint32_t chain, const Box3& box, float margin) {
         Binary bound;
         bound.kind = Binary::Kind::Bound;
@@ -260,17 +249,12 @@ private:
         task.right = false;
     }
 
-    // A union of the two nearest copies an axis. A child that is not an exact distance is bounded by its box, so that where the
-    // second nearest copy changes sides both candidates are their boxes' distances, which are equal there.
-    void expand_copies(const Task& task, const Warp& warp, const Box3& child) {
-        int axes[3];
-        int count = 0;
+    // A union of the two nearest copies an axis. In a repeat, a child that is not an exact distance is bounded by its box, so that where
+    // the second nearest copy changes sides both candidates are their boxes' distances, which are equal there.
+    void expand_copies(const Task& task, const Warp& warp, const Box3& child, const EntryFactor& factor) {
         float spacing = INFINITY;
-        for (int axis = 0; axis < 3; ++axis) {
-            if (warp.params[size_t(axis)] > 0 && warp.params[size_t(axis) + 3] != 1) {
-                axes[count++] = axis;
-                spacing = std::min(spacing, warp.params[size_t(axis)]);
-            }
+        for (size_t axis = 0; axis < 3; ++axis) {
+            if (factor.second[axis]) spacing = std::min(spacing, warp.params[axis]);
         }
         const auto middle = [](float lo, float hi) {
             return std::isfinite(lo) && std::isfinite(hi) ? 0.5f * (lo + hi) : 0.0f;
@@ -280,7 +264,7 @@ private:
         const bool exact = task.entries == 0 && task.node->kind == Node::Kind::Shape &&
                            shape_rows()[task.node->shape.kind].how == KindRow::Exact;
         const uint32_t chain = flush(task.chain, task.pending);
-        const uint32_t copies = 1u << count;
+        const uint32_t copies = uint32_t(factor.copies());
         Task holder = task;
         for (uint32_t c = 0; c < copies; ++c) {
             Task copy = task;
@@ -297,12 +281,14 @@ private:
             }
             copy.parent = holder.parent;
             float second[3] = {0, 0, 0};
-            for (int i = 0; i < count; ++i) second[axes[i]] = (c >> i & 1u) != 0 ? 1.0f : 0.0f;
+            for (uint32_t axis = 0, bit = 0; axis < 3; ++axis) {
+                if (factor.second[axis]) second[axis] = float(c >> bit++ & 1u);
+            }
             copy.chain =
                 add_step(chain, Opcode::PointCopy, warp.kind,
                          add_params({center.x, center.y, center.z, second[0], second[1], second[2]}, warp.params));
             copy.pending = {};
-            if (!exact && count > 0) add_bound(copy, copy.chain, child, 0.5f * spacing);
+            if (!exact && !factor.bounded && copies > 1) add_bound(copy, copy.chain, child, 0.5f * spacing);
             tasks_.push_back(copy);
         }
     }

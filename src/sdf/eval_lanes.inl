@@ -65,10 +65,6 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
             for (int i = 0; i < KILN_VECTORS; ++i)
                 set_point(r.point, i, copy_warp(aux, point_at(r.point, i), w + 6, param3_at(w), param3_at(w + 3)));
             break;
-        case Opcode::PointClamp:
-            for (int i = 0; i < KILN_VECTORS; ++i)
-                set_point(r.point, i, clamp(point_at(r.point, i), param3_at(w), param3_at(w + 3)));
-            break;
         case Opcode::Shape:
             for (int i = 0; i < KILN_VECTORS; ++i)
                 dst.v[i] = shape_distance(aux, point_at(r.point, i), w + 3, samples) * param(w[0]);

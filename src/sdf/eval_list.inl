@@ -208,7 +208,7 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
         size_t end = pc;
         while (end < count) {
             const uint32_t word = code[2 * end++];
-            if (Opcode(word & 15u) > Opcode::PointClamp && ((word >> 12) & 31u) == 0u) break;
+            if (Opcode(word & 15u) > Opcode::PointCopy && ((word >> 12) & 31u) == 0u) break;
         }
         for (int slice = 0; slice < kBrickSlices; ++slice) {
             for (int i = 0; i < kSliceVectors; ++i) {

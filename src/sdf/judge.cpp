@@ -112,58 +112,44 @@ double Judge::distance(dvec3 p_world) const {
                 const Warp& warp = node.domain[entry];
                 const KindRow::How how = warp_rows()[warp.kind].how;
                 const Box3& solid = f.bounds->stages[entry + 1];
-                if (how == KindRow::Copies) {
-                    const Box3& child = f.bounds->stages[entry];
-                    const auto middle = [](float lo, float hi) {
-                        return std::isfinite(lo) && std::isfinite(hi) ? 0.5 * (double(lo) + double(hi)) : 0.0;
-                    };
-                    const real3 center(middle(child.min.x, child.max.x), middle(child.min.y, child.max.y),
-                                       middle(child.min.z, child.max.z));
-                    // All eight corners of the two nearest an axis; where an axis has one copy they coincide.
-                    const auto copy = [&](uint32_t c) {
-                        return judging::copy_warp(warp.kind, f.p, warp.params.data(), center,
-                                                  real3(c & 1u, c >> 1 & 1u, c >> 2 & 1u));
-                    };
-                    if (f.step > 0) {
-                        const bool exact = entry == 0 && node.kind == Node::Kind::Shape &&
-                                           shape_rows()[node.shape.kind].how == KindRow::Exact;
+                const EntryFactor& factor = f.bounds->factors[entry];
+                const Box3& child = f.bounds->stages[entry];
+                const auto middle = [](float lo, float hi) {
+                    return std::isfinite(lo) && std::isfinite(hi) ? 0.5 * (double(lo) + double(hi)) : 0.0;
+                };
+                const real3 center(middle(child.min.x, child.max.x), middle(child.min.y, child.max.y),
+                                   middle(child.min.z, child.max.z));
+                // All eight corners of the two nearest an axis; where an axis has one copy they coincide or lie outside the region.
+                const uint32_t copies = how == KindRow::Copies ? 8 : 1;
+                const auto seen = [&](uint32_t c) {
+                    if (how == KindRow::Point) return judging::point_warp(warp.kind, f.p, warp.params.data());
+                    if (how == KindRow::Value) return f.p;
+                    return judging::copy_warp(warp.kind, f.p, warp.params.data(), center,
+                                              real3(c & 1u, c >> 1 & 1u, c >> 2 & 1u));
+                };
+                if (f.step > 0) {
+                    const bool exact = entry == 0 && node.kind == Node::Kind::Shape &&
+                                       shape_rows()[node.shape.kind].how == KindRow::Exact;
+                    if (how == KindRow::Copies && !factor.bounded && factor.copies() > 1 && !exact) {
                         double spacing = INFINITY;
                         for (size_t axis = 0; axis < 3; ++axis) {
-                            if (warp.params[axis] > 0 && warp.params[axis + 3] != 1) {
-                                spacing = std::min(spacing, double(warp.params[axis]));
-                            }
+                            if (factor.second[axis]) spacing = std::min(spacing, double(warp.params[axis]));
                         }
-                        if (!exact && std::isfinite(spacing)) {
-                            answer = std::max(std::min(answer, 0.5 * spacing), box_distance(copy(f.step - 1), child));
-                        }
-                        f.value = f.step == 1 ? answer : std::min(f.value, answer);
+                        answer = std::max(std::min(answer, 0.5 * spacing), box_distance(seen(f.step - 1), child));
                     }
-                    if (f.step == 8) {
-                        answer = f.value;
-                        stack.pop_back();
-                    } else {
-                        const Frame next{f.node, f.bounds, f.object, f.level - 1, copy(f.step++)};
-                        stack.push_back(next);
-                    }
+                    f.value = f.step == 1 ? answer : std::min(f.value, answer);
+                }
+                if (f.step < copies) {
+                    const Frame next{f.node, f.bounds, f.object, f.level - 1, seen(f.step++)};
+                    stack.push_back(next);
                     continue;
                 }
-                const EntryFactor factor = entry_factor(warp, solid);
-                const bool bound = factor.bounded;
-                if (f.step++ == 0) {
-                    real3 p = f.p;
-                    if (how == KindRow::Point) {
-                        const Box3 wide = solid.inflated(factor.margin);
-                        if (bound) p = clamp(p, to_real3(wide.min), to_real3(wide.max));
-                        p = judging::point_warp(warp.kind, p, warp.params.data());
-                    }
-                    const Frame next{f.node, f.bounds, f.object, f.level - 1, p};
-                    stack.push_back(next);
-                } else {
-                    if (how == KindRow::Value) answer = judging::value_warp(warp.kind, answer, f.p, warp.params.data());
-                    answer /= double(factor.lipschitz);
-                    if (bound) answer = std::max(std::min(answer, double(factor.margin)), box_distance(f.p, solid));
-                    stack.pop_back();
-                }
+                answer = f.value;
+                if (how == KindRow::Value) answer = judging::value_warp(warp.kind, answer, f.p, warp.params.data());
+                answer /= double(factor.lipschitz);
+                if (factor.bounded)
+                    answer = std::max(std::min(answer, double(factor.margin)), box_distance(f.p, solid));
+                stack.pop_back();
                 continue;
             }
             // The bare content.

@@ -42,7 +42,6 @@ enum class Opcode : uint32_t {
     PointAffineOn,   // P = M · (P − t)         t[3] M[9]
     PointWarp,       // P = point_warp[aux](P)  its params
     PointCopy,       // P = copy_warp[aux](P)   middle[3] second[3] its params
-    PointClamp,      // P = clamp(P, lo, hi)    lo[3] hi[3]
     Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
     Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
     Bound,           // R[dst] = max(min(R[dst], m), s · signed distance(P, box))   s, m, lo[3] hi[3]
@@ -70,7 +69,7 @@ struct Instruction {
     constexpr uint32_t a() const { return (word >> 17) & 31u; }
     constexpr uint32_t b() const { return (word >> 22) & 31u; }
     constexpr bool starts_chain() const { return opcode() <= Opcode::PointAffine; }
-    constexpr bool moves_point() const { return opcode() <= Opcode::PointClamp; }
+    constexpr bool moves_point() const { return opcode() <= Opcode::PointCopy; }
     friend bool operator==(const Instruction&, const Instruction&) = default;
 };
 static_assert(sizeof(Instruction) == 8);

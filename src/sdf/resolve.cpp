@@ -17,6 +17,8 @@
 #include "sdf/library/library.h"
 #include "sdf/tables.h"
 
+#include <kiln/shapes.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -112,8 +114,14 @@ Hull fold_bounds(const Node& node, const std::vector<NodeBounds>& nodes) {
     return out;
 }
 
+bool has_face(const Box3& box) {
+    return std::isfinite(box.min.x) || std::isfinite(box.min.y) || std::isfinite(box.min.z) ||
+           std::isfinite(box.max.x) || std::isfinite(box.max.y) || std::isfinite(box.max.z);
+}
+
 // A repeat needs its child's bounds to fit one spacing on every axis that it repeats.
 const char* repeat_fault(const Warp& warp, const Box3& child) {
+    if (warp.kind != uint16_t(WarpKind::Repeat)) return nullptr;
     const float size[3] = {child.max.x - child.min.x, child.max.y - child.min.y, child.max.z - child.min.z};
     for (size_t axis = 0; axis < 3; ++axis) {
         const float spacing = warp.params[axis];
@@ -124,10 +132,56 @@ const char* repeat_fault(const Warp& warp, const Box3& child) {
     return nullptr;
 }
 
-int repeat_axes(const Warp& warp) {
-    int n = 0;
-    for (size_t axis = 0; axis < 3; ++axis) n += warp.params[axis] > 0 && warp.params[3 + axis] != 1;
-    return n;
+// Bounded leaf of an entry that moves points, with f(p) = child(map(p)), the child 1-Lipschitz, its solid in its box B, value and B
+// keeping the promise of the head comment. N is B inflated by M, in the child's space; L the map's largest stretch where it leads
+// into N. Outside N the child's value is at least rate · M, so u = min(f / L, m) with m = rate · M / L is
+//   - m at every point that the map takes out of N,
+//   - 1-Lipschitz along a way whose image stays in N, for f changes by at most L times the way.
+// Any straight way is made of such pieces (u is m where they meet, also where the map jumps, if it jumps from outside N to outside
+// N), so u is 1-Lipschitz; so is the signed distance to a box, hence their maximum. u has the child's sign, and in the box of the
+// solid after the entry the box's distance is negative: the solid is the child's image. Nothing is asked of the map outside N.
+EntryFactor entry_factor(const Warp& warp, const Hull& child, const Box3& after) {
+    constexpr float inf = std::numeric_limits<float>::infinity();
+    const auto second = [&](const Box3& region) {
+        return is_copies(warp) ? second_copies(warp, region) : vec3{0, 0, 0};
+    };
+    EntryFactor out;
+    const auto see = [&](const Box3& region) {
+        const vec3 s = second(region);
+        out.second[0] = s.x != 0, out.second[1] = s.y != 0, out.second[2] = s.z != 0;
+    };
+    const float everywhere = warp_lipschitz(warp, {{-inf, -inf, -inf}, {inf, inf, inf}});
+    if (everywhere == 1.0f) {
+        see(child.box);
+        return out;
+    }
+    if (warp_rows()[warp.kind].how == KindRow::Value) {
+        // 1-Lipschitz everywhere once divided; the box makes it grow with rate 1.
+        out.lipschitz = everywhere;
+        out.bounded = has_face(after);
+        return out;
+    }
+    out.bounded = true;
+    const float least = warp_lipschitz(warp, child.box);
+    const vec3 half = child.box.half_extents();
+    float size = 0;
+    for (float extent : {half.x, half.y, half.z}) size = std::max(size, std::isfinite(extent) ? extent : 0.0f);
+    if (size == 0) size = 1;  // a solid without size, or without an end
+    // The wider the margin, the farther the value stays close to the true distance, but the larger the factor. One that needs no
+    // second copy is preferred unless it is narrow.
+    for (bool alone : {true, false}) {
+        for (float share = 0.25f; share > (alone ? 0.05f : 1e-3f); share *= 0.5f) {
+            const Box3 region = child.box.inflated(share * size);
+            const float l = warp_lipschitz(warp, region);
+            if (!std::isfinite(l) || l > 2.0f * least || (alone && second(region) != second(child.box))) continue;
+            out.lipschitz = l;
+            out.margin = child.rate * share * size / l;
+            see(region);
+            return out;
+        }
+    }
+    out.lipschitz = inf;
+    return out;
 }
 
 // Largest difference between neighbours along x and along z.
@@ -312,24 +366,27 @@ private:
             box = shape_bounds(node.shape);
         }
         out.stages.clear();
+        out.factors.clear();
         out.stages.push_back(box);
         for (size_t i = 0; i < node.domain.size(); ++i) {
             const Warp& warp = node.domain[i];
             where_.warp = int(i);
-            if (is_copies(warp)) {
-                if (const char* why = repeat_fault(warp, box)) return fail(fault_, where_, why);
-                leaves <<= repeat_axes(warp);
-            }
-            box = warp_bounds(warp, box, hull.rate);
-            const EntryFactor factor = entry_factor(warp, box);
+            if (const char* why = repeat_fault(warp, box)) return fail(fault_, where_, why);
+            const Box3 after = warp_bounds(warp, box, hull.rate);
+            const EntryFactor factor = entry_factor(warp, hull, after);
             if (std::isinf(factor.lipschitz)) {
                 return fail(fault_, where_,
-                            box.finite() ? "bends this shape further than it can go; use a smaller value"
-                                         : "needs a shape of finite size; use it on a bounded shape");
+                            warp.kind == uint16_t(WarpKind::Bend) && box.finite()
+                                ? "bends this shape through the centre of its circle or twice around it; use a smaller "
+                                  "curvature or shape"
+                                : "needs a shape of finite size; use it on a bounded shape");
             }
-            hull.rate = factor.bounded ? 1 : hull.rate / factor.lipschitz;
-            if (is_copies(warp) && repeat_axes(warp) > 0) hull.rate = 1;
+            // Copies of a repeat are exact or bounded by their boxes.
+            if (factor.bounded || factor.copies() > 1) hull.rate = 1;
+            box = after;
+            leaves *= uint64_t(factor.copies());
             out.stages.push_back(box);
+            out.factors.push_back(factor);
             leaves = std::min(leaves, uint64_t(1) << 40);
         }
         where_.warp = -1;
@@ -379,33 +436,6 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
         if (field.name == "step_z") params[at] = grids[index].steps.y;
     }
     return params;
-}
-
-EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {
-    constexpr float inf = std::numeric_limits<float>::infinity();
-    EntryFactor out;
-    const float everywhere = warp_lipschitz(warp, {{-inf, -inf, -inf}, {inf, inf, inf}});
-    if (everywhere == 1.0f) return out;
-    if (warp_rows()[warp.kind].how == KindRow::Value && !solid_after.finite()) {
-        out.lipschitz = everywhere;
-        return out;
-    }
-    out.bounded = true;
-    out.lipschitz = warp_lipschitz(warp, solid_after);
-    // The wider the margin, the farther the value stays close to the true distance, but the larger the factor.
-    const vec3 half = solid_after.half_extents();
-    float size = 0;
-    for (float extent : {half.x, half.y, half.z}) size = std::max(size, std::isfinite(extent) ? extent : 0.0f);
-    for (float share : {0.25f, 0.125f, 0.0625f, 0.03125f}) {
-        out.margin = share * size;
-        const float l = warp_lipschitz(warp, solid_after.inflated(out.margin));
-        if (std::isfinite(l) && l <= 2.0f * out.lipschitz) {
-            out.lipschitz = l;
-            return out;
-        }
-    }
-    out.lipschitz = inf;
-    return out;
 }
 
 Result<Resolved> resolve(const Source& source, Fault* fault) {

@@ -10,9 +10,20 @@
 
 namespace kiln::sdf {
 
+/// How an entry with value f over its child is evaluated: rigid entries as f, others as the bounded leaf
+/// max(min(f / lipschitz, margin), signed distance to the box of the solid after the entry).
+struct EntryFactor {
+    float lipschitz = 1;
+    float margin = kEmpty;
+    bool bounded = false;  ///< evaluated as a bounded leaf
+    bool second[3] = {};   ///< Copies: axes along which two points see the child
+    int copies() const { return 1 << (int(second[0]) + int(second[1]) + int(second[2])); }
+};
+
 /// Bounds of one node: solid of its bare content, then after each domain entry, then in its parent's space.
 struct NodeBounds {
-    std::vector<Box3> stages;  ///< [0] content, [i + 1] after domain[i]
+    std::vector<Box3> stages;          ///< [0] content, [i + 1] after domain[i]
+    std::vector<EntryFactor> factors;  ///< of domain[i]
     Box3 parent;
     float rate = 1;       ///< (0, 1]: outside `parent` the node's value is at least rate · distance(p, parent)
     uint64_t leaves = 1;  ///< primitives it expands to, copies counted
@@ -43,14 +54,5 @@ struct Resolved {
 
 /// Follows everything the visible edits reach. Faults as compile().
 Result<Resolved> resolve(const Source& source, Fault* fault);
-
-/// The margin m and factor L of a Lipschitz-bounded entry: its divided child is proven on the solid's box inflated by m
-/// (architecture: bounded leaf). An entry that stretches nothing anywhere, or a value entry on an unbounded solid, needs no box.
-struct EntryFactor {
-    float lipschitz = 1;
-    float margin = 0;
-    bool bounded = false;  ///< evaluated as a bounded leaf
-};
-EntryFactor entry_factor(const Warp& warp, const Box3& solid_after);
 
 }  // namespace kiln::sdf

@@ -55,16 +55,15 @@ const uint kOpPointAffine = 2u;
 const uint kOpPointAffineOn = 3u;
 const uint kOpPointWarp = 4u;
 const uint kOpPointCopy = 5u;
-const uint kOpPointClamp = 6u;
-const uint kOpShape = 7u;
-const uint kOpValue = 8u;
-const uint kOpBound = 9u;
-const uint kOpCombine = 10u;
-const uint kOpMove = 11u;
-const uint kOpNegate = 12u;
-const uint kOpEmpty = 13u;
-const uint kOpTake = 14u;
-const uint kOpConstant = 15u;
+const uint kOpShape = 6u;
+const uint kOpValue = 7u;
+const uint kOpBound = 8u;
+const uint kOpCombine = 9u;
+const uint kOpMove = 10u;
+const uint kOpNegate = 11u;
+const uint kOpEmpty = 12u;
+const uint kOpTake = 13u;
+const uint kOpConstant = 14u;
 const uint kOpPaint = 3u;  // value of kiln::Op::Paint
 
 vec3 tape_vec3(uint at) { return vec3(sdf_param(at), sdf_param(at + 1u), sdf_param(at + 2u)); }
@@ -107,9 +106,6 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                 break;
             case kOpPointCopy:
                 if (KILN_USES_OPCODE(kOpPointCopy)) p = copy_warp(aux, p, at + 6u, tape_vec3(at), tape_vec3(at + 3u));
-                break;
-            case kOpPointClamp:
-                if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
                 break;
             case kOpShape:
                 value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);

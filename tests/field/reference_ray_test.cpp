@@ -2,7 +2,7 @@
 // Gate G1 on the CPU: the march's own text (march.gpu.h and cubic.gpu.h, the same that the shader compiles) against the reference.
 
 #include "field/reference_ray.h"
-#include "worlds.h"
+#include "twenty_worlds.h"
 
 #include <cmath>
 
@@ -13,7 +13,11 @@ struct Tally {
     int rays = 0, hits = 0, tangent = 0, mismatches = 0, far = 0;
     int along = 0;  // tangent because they run along planes of the lattice, and so of boxes
     double worst = 0;
+    int grazing = 0;  // within kAcross of the surface, though farther than 1e-4 along the ray
 };
+
+// Voxels across the surface: rounding of values, and twice the overlap of brick faces.
+constexpr double kAcross = 2.5e-5;
 
 // Rays of all kinds: from outside, from within, parallel to axes, along texel planes and edges, through texels.
 TexelRay random_ray(worlds::Random& r, const GridParams& g, bool& special) {
@@ -38,6 +42,18 @@ TexelRay random_ray(worlds::Random& r, const GridParams& g, bool& special) {
     return texel_ray(whole, {from.x - float(whole.x), from.y - float(whole.y), from.z - float(whole.z)}, d);
 }
 
+// Is the ray within kAcross of an outer face of the grid? Where a world is cut off there, it may leave before it hits.
+bool gone_at(const HostBricks& bricks, const TexelRay& ray, double t) {
+    const GridParams g = bricks.field().grid();
+    const auto at = [&](int whole, float part, float d, int first, int size) {
+        const double p = double(whole) + double(part) + double(d) * t;
+        return std::fabs(p - 7.0 * first) < kAcross || std::fabs(p - 7.0 * (first + size)) < kAcross;
+    };
+    return at(ray.whole.x, ray.part.x, ray.direction.x, g.cell_x, g.size_x) ||
+           at(ray.whole.y, ray.part.y, ray.direction.y, g.cell_y, g.size_y) ||
+           at(ray.whole.z, ray.part.z, ray.direction.z, g.cell_z, g.size_z);
+}
+
 Tally compare(const HostBricks& bricks, uint32_t seed, int rays) {
     Tally tally;
     worlds::Random r(seed);
@@ -54,7 +70,9 @@ Tally compare(const HostBricks& bricks, uint32_t seed, int rays) {
         tally.hits += expected.state == kMarchHit;
         const double off = std::fabs(double(got.t) - expected.t);
         const bool agree = got.state == expected.state;
-        if (!agree) {
+        if (!agree && (gone_at(bricks, ray, double(got.t)) || gone_at(bricks, ray, expected.t))) {
+            (special ? tally.along : tally.grazing) += 1;
+        } else if (!agree) {
             ++tally.mismatches;
             if (tally.mismatches <= 5) {
                 ADD_FAILURE() << "ray " << i << ": state " << got.state << " at " << got.t << ", reference "
@@ -64,6 +82,10 @@ Tally compare(const HostBricks& bricks, uint32_t seed, int rays) {
                               << ray.direction.y << " " << ray.direction.z;
             }
         } else if (got.state != kMarchMiss) {
+            if (off > 1e-4 && off * expected.slope < kAcross) {
+                (special ? tally.along : tally.grazing) += 1;
+                continue;
+            }
             tally.worst = std::max(tally.worst, off);
             if (off > 1e-4) {
                 ++tally.far;
@@ -81,26 +103,32 @@ Tally compare(const HostBricks& bricks, uint32_t seed, int rays) {
     return tally;
 }
 
-TEST(ReferenceRay, MarchAgreesWithBisectionOnEveryWorld) {
+// Gate G1 asks 10^5 rays of each of twenty scenes; the short form shoots a part of them.
+void expect_agreement(int rays_half, int rays_snorm8) {
     uint32_t seed = 1;
     int tangent = 0, rays = 0;
-    for (worlds::World world : worlds::all()) {
+    for (worlds::World world : worlds::twenty()) {
         for (const DistanceFormat format : {DistanceFormat::Half, DistanceFormat::Snorm8}) {
             world.options.format = format;
             const HostBricks bricks = HostBricks::bake(world.field());
-            const Tally tally = compare(bricks, seed++, format == DistanceFormat::Half ? 40000 : 10000);
+            const Tally tally = compare(bricks, seed++, format == DistanceFormat::Half ? rays_half : rays_snorm8);
             EXPECT_EQ(tally.mismatches, 0) << world.name;
             EXPECT_EQ(tally.far, 0) << world.name << ": worst " << tally.worst;
-            tangent += tally.tangent;
+            EXPECT_GT(tally.hits, tally.rays / 50) << world.name;
+            tangent += tally.tangent + tally.grazing;
             rays += tally.rays;
-            RecordProperty(
+            testing::Test::RecordProperty(
                 world.name + (format == DistanceFormat::Half ? " half worst voxels" : " snorm8 worst voxels"),
                 std::to_string(tally.worst));
         }
     }
-    EXPECT_LE(tangent, rays / 10000) << "rays left out as tangent, of " << rays;
-    RecordProperty("tangent", tangent);
+    EXPECT_LE(tangent, rays / 10000) << "rays left out as tangent or grazing, of " << rays;
+    testing::Test::RecordProperty("tangent", tangent);
 }
+
+TEST(ReferenceRay, MarchAgreesWithBisectionOnEveryWorld) { expect_agreement(12000, 3000); }
+
+TEST(ReferenceRaySlow, MarchAgreesWithBisectionOnAHundredThousandRaysOfEachWorld) { expect_agreement(100000, 20000); }
 
 // A ray of one voxel's cubic: every pattern of signs and degeneracy.
 TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {

@@ -19,10 +19,13 @@
 
 namespace kiln::field::worlds {
 
-inline std::shared_ptr<const sdf::Program> compiled(const std::vector<Edit>& edits) {
-    auto program = sdf::compile({edits, {}, {}});
+inline std::shared_ptr<const sdf::Program> compiled(const sdf::Source& source) {
+    auto program = sdf::compile(source);
     EXPECT_TRUE(program) << (program ? "" : program.error().message);
     return std::make_shared<const sdf::Program>(program ? std::move(*program) : sdf::Program{});
+}
+inline std::shared_ptr<const sdf::Program> compiled(const std::vector<Edit>& edits) {
+    return compiled(sdf::Source{edits, {}, {}});
 }
 
 inline Edit edit(Shape shape, vec3 position = {}, Op op = Op::Union, float blend = 0) {
@@ -43,9 +46,11 @@ struct World {
     std::string name;
     std::vector<Edit> edits;
     FieldOptions options;
+    std::vector<sdf::HeightGrid> grids{};
 
+    sdf::Source source() const { return {edits, {}, grids}; }
     std::shared_ptr<const Field> field() const {
-        auto made = Field::build(compiled(edits), options);
+        auto made = Field::build(compiled(source()), options);
         EXPECT_TRUE(made) << (made ? "" : made.error().message);
         return made ? *made : nullptr;
     }

@@ -5,6 +5,7 @@
 #include "texts.h"
 
 #include "sdf/eval.h"
+#include "sdf/judge.h"
 #include "sdf/program.h"
 
 #include <kiln/shapes.h>
@@ -162,6 +163,26 @@ double expect_rate(Random& random, const Scene& scene, int points) {
     return tightest;
 }
 
+Around around_edit(const Program& program) {
+    const Box3& b = program.edits[0].bounds;
+    return Around({{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}});
+}
+
+void expect_one_lipschitz(Random& random, const Scene& scene, int points) {
+    const Result<Program> program = compile(scene.source());
+    if (!program) return;
+    const Around around = around_edit(*program);
+    for (int i = 0; i < points; ++i) {
+        const Point p = around.point(random);
+        const Point q = beside(random, p, around.size * std::pow(10.0, random.in(-4, 0.3)));
+        const double change = std::fabs(evaluate(view(*program), dvec3{p[0], p[1], p[2]}) -
+                                        evaluate(view(*program), dvec3{q[0], q[1], q[2]}));
+        if (change > between(p, q) * (1 + 1e-5) + 3e-6 * (1 + around.size + magnitude(p)))
+            RC_FAIL(describe(scene) + "\n too steep between " + show(p) + " and " + show(q) + ": " +
+                    std::to_string(change / between(p, q)));
+    }
+}
+
 class RateOfEachShape : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachShape, testing::Range(0, int(shape_rows().size())),
                          [](const auto& row) { return std::string(shape_rows()[size_t(row.param)].name); });
@@ -185,7 +206,7 @@ class RateOfEachWarp : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachWarp, testing::Range(0, int(warp_rows().size())),
                          [](const auto& row) { return std::string(warp_rows()[size_t(row.param)].name); });
 
-TEST_P(RateOfEachWarp, HoldsOverShapesOfAnyScale) {
+TEST_P(RateOfEachWarp, AndSlopeHoldOverShapesOfAnyScale) {
     int judged = 0;
     for_all("warp", [&](Random& random) {
         Scene scene;
@@ -193,12 +214,15 @@ TEST_P(RateOfEachWarp, HoldsOverShapesOfAnyScale) {
         squeezed.nodes.emplace_back();
         squeezed.nodes[0].shape = random_shape(random);
         squeezed.nodes[0].transform = random_transform(random);
+        const auto squeeze = [&] { return float(random.one_in(2) ? 1 : random.in(0.1, 0.5)); };
+        if (random.one_in(2)) squeezed.nodes[0].transform.scale = {squeeze(), squeeze(), squeeze()};
         scene.objects.push_back(squeezed);
         scene.node().kind = Node::Kind::Object;
         scene.node().object = ObjectId{0, 0};
         scene.node().domain = {random_warp(random, GetParam())};
         scene.node().transform = random_transform(random);
         judged += std::isfinite(expect_rate(random, scene, 100));
+        expect_one_lipschitz(random, scene, 100);
     });
     EXPECT_GT(judged, 10);
 }
@@ -213,6 +237,35 @@ TEST(Rate, HoldsOverRandomTrees) {
             scene.node().object = ObjectId{2, 0};
             dress(random, scene.node());
             judged += std::isfinite(expect_rate(random, scene, 60));
+        });
+    }
+    EXPECT_GT(judged, 100);
+}
+
+TEST(Trees, AreOneLipschitzAndTheJudgesValue) {
+    int judged = 0;
+    for (int round = 0; round < 5; ++round) {
+        for_all("trees", [&](Random& random) {
+            Scene scene;
+            for (int o = 0; o < 2; ++o) scene.objects.push_back(random_tree(random, 8, o));
+            scene.node().kind = Node::Kind::Object;
+            scene.node().object = ObjectId{1, 0};
+            dress(random, scene.node());
+            expect_one_lipschitz(random, scene, 40);
+            const Result<Program> program = compile(scene.source());
+            const Result<Judge> judge = Judge::create(scene.source());
+            RC_ASSERT(bool(program) == bool(judge));
+            if (!program) return;
+            ++judged;
+            const Around around = around_edit(*program);
+            for (int i = 0; i < 40; ++i) {
+                const Point p = around.point(random);
+                const double value = evaluate(view(*program), dvec3{p[0], p[1], p[2]});
+                const double expected = judge->distance({p[0], p[1], p[2]});
+                if (std::fabs(value - expected) > 1.2e-5 * (1 + around.size + magnitude(p)))
+                    RC_FAIL(describe(scene) + "\n at " + show(p) + ": " + std::to_string(value) + ", the judge says " +
+                            std::to_string(expected));
+            }
         });
     }
     EXPECT_GT(judged, 100);
@@ -259,6 +312,42 @@ TEST(Rate, RoundOfASqueezedBallReachesFarther) {
     }
 }
 
+TEST(Slope, WhereTheEndsOfAnUnevenBarMeetTheValueDoesNotJump) {
+    Object bar;
+    bar.nodes = {shaped(Cone{.half_height = 3.1f, .radius_bottom = 0.4f, .radius_top = 0.05f})};
+    bar.nodes[0].transform.rotation = axis_angle({0, 0, 1}, -1.5707964f);  // along X
+    Scene scene;
+    scene.objects.push_back(bar);
+    scene.node().kind = Node::Kind::Object;
+    scene.node().object = ObjectId{0, 0};
+    scene.node().domain = {Bend{.curvature = 1}};
+    ASSERT_TRUE(compile(scene.source()));
+    for_all("seam", [&](Random& random) { expect_one_lipschitz(random, scene, 1000); });
+    const auto at = [&](double x, double y) { return evaluate(view(*compile(scene.source())), dvec3{x, y, 0}); };
+    EXPECT_NEAR(at(1e-6, 2.4), at(-1e-6, 2.4), 1e-5) << "beyond the thin end, beside the thick one";
+}
+
+TEST(Slope, NearTheCentreOfABendHoldsForAChildThatGrowsSlowly) {
+    // Its value grows by a twentieth along Y, so it is small at the centre of the circle, around which the bend stretches without end.
+    Object plank;
+    plank.nodes = {shaped(Box{.half_extents = {2.4f, 0.02f, 0.2f}}, {1, 20, 1})};
+    Scene scene;
+    scene.objects.push_back(plank);
+    scene.node().kind = Node::Kind::Object;
+    scene.node().object = ObjectId{0, 0};
+    scene.node().domain = {Bend{.curvature = 1}};
+    const auto program = compile(scene.source());
+    ASSERT_TRUE(program);
+    Random random(5);
+    for (int i = 0; i < 20000; ++i) {
+        const Point p{random.in(-0.4, 0.4), random.in(0.6, 1.4), random.in(-0.4, 0.4)};
+        const Point q = beside(random, p, 0.01);
+        const double change = std::fabs(evaluate(view(*program), dvec3{p[0], p[1], p[2]}) -
+                                        evaluate(view(*program), dvec3{q[0], q[1], q[2]}));
+        ASSERT_LE(change, between(p, q) * (1 + 1e-4) + 1e-6) << show(p) << ' ' << show(q);
+    }
+}
+
 TEST(Rate, ManyBlendedBallsOnOneSpotBulgeFartherThanTwo) {
     const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(6, shaped(Sphere{.radius = 0.5f})));
     EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0.7, 0, 0}), 0) << "a pair reaches 0.6";
@@ -271,13 +360,14 @@ TEST(Rate, SqueezedOnesBulgeByTheirRateFarther) {
     for_all("balls", [&](Random& random) { expect_rate(random, scene, 200); });
 }
 
-TEST(Rate, DisplacedGroundGrowsByItsFactorSlower) {
+TEST(Rate, DisplacedGroundIsBoundedByItsHighestHill) {
     Scene scene;
     scene.node().shape = Plane{};
     scene.node().domain = {Displace{.amplitude = 0.2f, .frequency = 3}};
     const auto program = compile(scene.source());
     ASSERT_TRUE(program && std::isfinite(program->edits[0].bounds.max.y));
-    EXPECT_NEAR(program->edits[0].rate, 1 / (1 + 0.2f * 3 * 3.5f), 1e-6f);
+    EXPECT_EQ(program->edits[0].rate, 1);
+    EXPECT_NEAR(evaluate(view(*program), dvec3{0, 100, 0}), 99.8, 1e-5);
     for_all("ground", [&](Random& random) { expect_rate(random, scene, 200); });
 }
 

@@ -2,6 +2,7 @@
 #include "rhi/validate/rules.h"
 
 #include "base/format.h"
+#include "rhi/binding_counts.h"
 #include "rhi/texture_math.h"
 
 #include <bit>
@@ -102,40 +103,12 @@ std::string check_counts(std::span<const std::vector<BindGroupLayoutEntry>> grou
     if (groups.size() > kMaxBindGroups)
         return formatted("{} bind groups, the floor is {}", groups.size(), kMaxBindGroups);
     for (const ShaderStage stage : {ShaderStage::Vertex, ShaderStage::Fragment, ShaderStage::Compute}) {
-        uint32_t uniform = 0, storage = 0, sampled = 0, samplers = 0, images = 0;
+        BindingCounts counts;
         for (const auto& entries : groups)
-            for (const BindGroupLayoutEntry& e : entries) {
-                if (!any(e.stages & stage)) continue;
-                switch (e.kind) {
-                case BindingKind::UniformBuffer:
-                    ++uniform;
-                    break;
-                case BindingKind::StorageBuffer:
-                case BindingKind::StorageBufferReadOnly:
-                    ++storage;
-                    break;
-                case BindingKind::SampledTexture:
-                    ++sampled;
-                    break;
-                case BindingKind::Sampler:
-                    ++samplers;
-                    break;
-                case BindingKind::StorageTexture:
-                case BindingKind::StorageTextureReadOnly:
-                    ++images;
-                    break;
-                }
-            }
-        if (uniform > kMaxUniformBuffersPerStage)
-            return formatted("{} uniform buffers in a stage, the floor is {}", uniform, kMaxUniformBuffersPerStage);
-        if (storage > kMaxStorageBuffersPerStage)
-            return formatted("{} storage buffers in a stage, the floor is {}", storage, kMaxStorageBuffersPerStage);
-        if (sampled > kMaxSampledTexturesPerStage)
-            return formatted("{} sampled textures in a stage, the floor is {}", sampled, kMaxSampledTexturesPerStage);
-        if (samplers > kMaxSamplersPerStage)
-            return formatted("{} samplers in a stage, the floor is {}", samplers, kMaxSamplersPerStage);
-        if (images > kMaxStorageTexturesPerStage)
-            return formatted("{} storage textures in a stage, the floor is {}", images, kMaxStorageTexturesPerStage);
+            for (const BindGroupLayoutEntry& e : entries)
+                if (any(e.stages & stage)) counts.add(e.kind);
+        for (const BindingCounts::Row& row : counts.rows())
+            if (row.is > row.most) return formatted("{} {} in a stage, the floor is {}", row.is, row.what, row.most);
     }
     return {};
 }

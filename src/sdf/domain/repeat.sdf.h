@@ -38,5 +38,11 @@ KILN_SDF Bounds bounds_repeat(Repeat s, Bounds child) {
                       repeat_reach(s.spacing.z, s.count.z));
     return Bounds{child.lo - r, child.hi + r};
 }
+// Axes along which a point can see two copies.
+KILN_SDF param3 second_repeat(Repeat s, Bounds region) {
+    return param3(s.spacing.x > 0.0f && s.count.x != 1.0f ? 1.0f : 0.0f,
+                  s.spacing.y > 0.0f && s.count.y != 1.0f ? 1.0f : 0.0f,
+                  s.spacing.z > 0.0f && s.count.z != 1.0f ? 1.0f : 0.0f);
+}
 KILN_SDF param lipschitz_repeat(Repeat s, Bounds region) { return 1.0f; }
 #endif

@@ -22,12 +22,13 @@ KILN_SDF Bounds bounds_taper(Taper s, Bounds child) {
                   param3(child.hi.x * (child.hi.x > 0.0f ? most : least), child.hi.y,
                          child.hi.z * (child.hi.z > 0.0f ? most : least))};
 }
-// With c = 1 / scale the Jacobian, in the plane of the axis and the point, is [c b; 0 1], b = rate * r * c², and c across that plane;
-// its largest singular value squared is (S + sqrt(S² - 4 c²)) / 2, S = 1 + b² + c², which grows with b and c.
+// With c = 1 / scale the Jacobian, in the plane of the axis and the point, is [c b; 0 1], b = rate * r * c² = rate * c * (r of the bare
+// point), and c across that plane; its largest singular value squared is (S + sqrt(S² - 4 c²)) / 2, S = 1 + b² + c², which grows
+// with b and c.
 KILN_SDF param lipschitz_taper(Taper s, Bounds region) {
     if (s.rate == 0.0f) return 1.0f;
     const param c = 1.0f / max(1.0f - max(s.rate * region.lo.y, s.rate * region.hi.y), KILN_C(0.05));
-    const param b = abs(s.rate) * farthest_xz(region) * c * c;
+    const param b = abs(s.rate) * farthest_xz(region) * c;
     const param sum = 1.0f + b * b + c * c;
     return sqrt(0.5f * (sum + sqrt(max((sum - 2.0f * c) * (sum + 2.0f * c), 0.0f))));
 }

@@ -20,7 +20,7 @@ KILN_SDF Bounds bounds_twist(Twist s, Bounds child) {
     param r = farthest_xz(child);
     return Bounds{param3(-r, child.lo.y, -r), param3(r, child.hi.y, r)};
 }
-// The Jacobian is a rotation times the shear [1 a; 0 1], a = rate * r, whose largest singular value is (a + sqrt(a² + 4)) / 2.
+// The distance from the axis stays. The Jacobian is a rotation times the shear [1 a; 0 1], a = rate * r, whose largest singular value is (a + sqrt(a² + 4)) / 2.
 KILN_SDF param lipschitz_twist(Twist s, Bounds region) {
     param a = abs(s.rate) * farthest_xz(region);
     return 0.5f * (a + sqrt(a * a + 4.0f));

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: MIT
+// What every reader of files promises of any bytes, for the deterministic tests and for libFuzzer. Each answers the broken promise, or
+// nothing.
+#pragma once
+
+#include "scene/heights.h"
+#include "scene/scene_file.h"
+
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace kiln::scene {
+
+// A scene, which is saved and read again unchanged, or an error of kind Input of one line with a place.
+inline std::string scene_complaint(const std::string& text) {
+    const auto scene = read_scene(text, "f.json");
+    if (!scene) {
+        const std::string& message = scene.error().message;
+        if (scene.error().kind != ErrorKind::Input) return "kind of: " + message;
+        if (!message.starts_with("f.json:")) return "no place: " + message;
+        return message.find('\n') == std::string::npos ? "" : "several lines: " + message;
+    }
+    const std::string saved = write_scene(*scene, scene->stage);
+    const auto again = read_scene(saved, "f.json");
+    if (!again) return again.error().message + "\n" + saved.substr(0, 2000);
+    return write_scene(*again, again->stage) == saved ? "" : "saved again it differs:\n" + saved.substr(0, 2000);
+}
+
+// A grid of numbers in [0, 1], or an error of kind Input that names the file.
+inline std::string heights_complaint(std::span<const uint8_t> bytes) {
+    const int file = memfd_create("heights.png", 0);
+    if (file < 0 || write(file, bytes.data(), bytes.size()) != ssize_t(bytes.size())) return "no file in memory";
+    const std::string path = "/proc/self/fd/" + std::to_string(file);
+    const auto grid = load_heights(path);
+    close(file);
+    if (!grid) {
+        if (grid.error().kind != ErrorKind::Input) return "kind of: " + grid.error().message;
+        return grid.error().message.starts_with(path) ? "" : "no file named: " + grid.error().message;
+    }
+    if (grid->columns < 2 || grid->rows < 2) return "less than 2 x 2";
+    if (grid->values.size() != size_t(grid->columns) * size_t(grid->rows)) return "columns x rows are not its numbers";
+    for (const float v : grid->values)
+        if (!(v >= 0 && v <= 1)) return "a height of " + std::to_string(v);
+    return "";
+}
+
+}  // namespace kiln::scene
