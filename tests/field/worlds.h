@@ -13,14 +13,16 @@
 
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace kiln::field::worlds {
 
-inline std::shared_ptr<const sdf::Program> compiled(const std::vector<Edit>& edits) {
-    auto program = sdf::compile({edits, {}, {}});
+inline std::shared_ptr<const sdf::Program> compiled(const std::vector<Edit>& edits,
+                                                    std::span<const sdf::MeshGrid> meshes = {}) {
+    auto program = sdf::compile({.edits = edits, .objects = {}, .grids = {}, .meshes = meshes});
     EXPECT_TRUE(program) << (program ? "" : program.error().message);
     return std::make_shared<const sdf::Program>(program ? std::move(*program) : sdf::Program{});
 }
@@ -43,9 +45,10 @@ struct World {
     std::string name;
     std::vector<Edit> edits;
     FieldOptions options;
+    std::vector<sdf::MeshGrid> meshes = {};
 
     std::shared_ptr<const Field> field() const {
-        auto made = Field::build(compiled(edits), options);
+        auto made = Field::build(compiled(edits, meshes), options);
         EXPECT_TRUE(made) << (made ? "" : made.error().message);
         return made ? *made : nullptr;
     }
