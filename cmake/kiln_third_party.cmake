@@ -32,6 +32,9 @@ function(kiln_third_party header out)
     elseif(header STREQUAL "volk.h")
         set(found ${CMAKE_DL_LIBS})
         kiln_consumer_needs("" "" "-ldl")
+    elseif(header STREQUAL "tiny_gltf.h")
+        find_path(KILN_TINYGLTF tiny_gltf.h REQUIRED)
+        find_package(nlohmann_json REQUIRED)  # which it includes
     elseif(header STREQUAL "nlohmann/")
         find_package(nlohmann_json REQUIRED)
     elseif(NOT header MATCHES "^(oneapi|Imath|vulkan|vk_video)/$")  # these come with one of the above, or are headers alone

@@ -47,12 +47,21 @@ int validate(const Options& o) {
     if (o.json) {
         Json json;
         json.text("scene", o.scene).flag("valid", bool(world));
-        if (world) json.number("edits", double(world->edits().size()));
+        if (world) {
+            json.number("edits", double(world->edits().size()));
+            std::string notes;
+            for (const std::string& note : world->model_notes())
+                notes += (notes.empty() ? "" : ", ") + Json::quoted(note);
+            if (!notes.empty()) json.raw("models", "[" + notes + "]");
+        }
         if (!world) json.text("error", world.error().message);
         (void)put(json.line());
     }
     if (!world) return fail(world.error());
-    if (!o.json) (void)put(o.scene + ": valid, " + std::to_string(world->edits().size()) + " edits\n");
+    if (!o.json) {
+        (void)put(o.scene + ": valid, " + std::to_string(world->edits().size()) + " edits\n");
+        for (const std::string& note : world->model_notes()) (void)put("  " + note + "\n");
+    }
     return finish_data();
 }
 

@@ -16,9 +16,9 @@
 namespace kiln::cli {
 namespace {
 
-constexpr std::string_view kVerbs[] = {"demo",   "render", "query",   "inspect", "validate",
-                                       "schema", "doctor", "compare", "export"};
-constexpr std::string_view kLaterVerbs[] = {"view", "edit", "import", "simulate", "new", "diff", "bench"};
+constexpr std::string_view kVerbs[] = {"demo",     "render", "query",  "import",  "export", "inspect",
+                                       "validate", "schema", "doctor", "compare"};
+constexpr std::string_view kLaterVerbs[] = {"view", "edit", "simulate", "new", "diff", "bench"};
 
 // In the list of verbs only the first line of each description; its own help shows all of it.
 class Help : public CLI::Formatter {
@@ -73,6 +73,7 @@ int run(int argc, char** argv) {
     add_demo(app, verb);
     add_render(app, verb);
     add_query(app, verb);
+    add_import(app, verb);
     add_inspect(app, verb);
     add_validate(app, verb);
     add_schema(app, verb);

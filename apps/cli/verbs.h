@@ -14,6 +14,7 @@ using Run = std::function<int()>;
 void add_demo(CLI::App& app, Run& run);
 void add_render(CLI::App& app, Run& run);
 void add_query(CLI::App& app, Run& run);
+void add_import(CLI::App& app, Run& run);
 void add_inspect(CLI::App& app, Run& run);
 void add_validate(CLI::App& app, Run& run);
 void add_schema(CLI::App& app, Run& run);

@@ -27,6 +27,13 @@ struct FieldSettings {
     bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16
 };
 
+/// How a model file is taken into a scene.
+struct ImportSettings {
+    float unit = 1;        ///< metres a unit of the file
+    bool z_up = false;     ///< the file's +Z becomes +Y
+    int resolution = 128;  ///< cells along the longest side, [8, 512]
+};
+
 class World {
 public:
     World();
@@ -37,6 +44,10 @@ public:
     /// A scene file, or the name of a bundled scene. Errors read "FILE:LINE:COLUMN: path.to.key: what; what would be right".
     static Result<World> load(const std::string& path_or_name);
     static Result<World> parse(std::string_view json, const std::string& file_name);
+    /// A world of one mesh edit that reads `model` (.glb .gltf .obj .off .ply .stl), with a camera that sees all of it. `scene` is where
+    /// it will be saved: the edit names the model relative to that. Errors read "MODEL: what; what would be right".
+    static Result<World> import(const std::string& model, const std::string& scene,
+                                const ImportSettings& settings = {});
     /// Writes the whole scene; the old file stays until the new one is complete.
     Result<void> save(const std::string& path) const;
     std::string to_json() const;
@@ -75,6 +86,8 @@ public:
 
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;
+    /// What was found in the model files that the edits read, one sentence each: "bunny.obj: closed manifold of 69666 triangles".
+    std::vector<std::string> model_notes() const;
     /// Sections of the scene that this version reads and keeps but does not draw ("meshes", "fluids", …).
     std::vector<std::string> not_drawn_yet() const;
 

@@ -4,6 +4,8 @@
 
 #include "sdf/tables.h"
 
+#include <kiln/shapes.h>
+
 #include <algorithm>
 
 namespace kiln::scene {
@@ -15,7 +17,51 @@ bool has_file(const Node& node) {
            sdf::shape_rows()[node.shape.kind].how == sdf::KindRow::Sampled;
 }
 
+// The numbers of a mesh shape by their names.
+SampledMesh mesh_fields(const Shape& shape) {
+    SampledMesh out;
+    for (const sdf::FieldRow& field : sdf::shape_rows()[shape.kind].fields()) {
+        if (field.name == "resolution") out.resolution = shape.params[size_t(field.offset)];
+        if (field.name == "closed") out.closed = shape.params[size_t(field.offset)];
+    }
+    return out;
+}
+
+bool is_mesh(const Node& node) { return ShapeKind(node.shape.kind) == ShapeKind::SampledMesh; }
+
+std::string in_folder(const std::string& folder, const std::string& file) {
+    return file.starts_with('/') ? file : folder + file;
+}
+
+// Reads and bakes what is not there yet.
+Result<uint32_t> mesh_number(const Shape& shape, const std::string& folder, Grids& grids) {
+    const SampledMesh fields = mesh_fields(shape);
+    const auto key = std::pair(shape.data, int(fields.resolution));
+    const auto found = grids.by_mesh.find(key);
+    if (found != grids.by_mesh.end()) {
+        bool& claimed = grids.mesh_notes[found->second].report.claimed_closed;
+        claimed = claimed || fields.closed != 0;
+        return found->second;
+    }
+    const std::string path = in_folder(folder, shape.data);
+    const auto mesh = model::read(path);
+    if (!mesh) return mesh.error();
+    auto baked = model::bake(*mesh, path, {.resolution = key.second, .closed = fields.closed != 0});
+    if (!baked) return baked.error();
+    const auto index = uint32_t(grids.meshes.size());
+    grids.meshes.push_back(std::move(baked->grid));
+    grids.mesh_notes.push_back({shape.data, key.second, std::move(baked->report)});
+    grids.by_mesh.emplace(key, index);
+    return index;
+}
+
 }  // namespace
+
+Resource resource_of(uint16_t shape_kind) {
+    if (ShapeKind(shape_kind) == ShapeKind::SampledMesh)
+        return {"bunny.obj", "a model (.glb, .gltf, .obj, .off, .ply, .stl)"};
+    return {"heights.png", "a PNG image"};
+}
 
 Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects,
                               const std::string& folder, Grids& grids, sdf::Fault* fault) {
@@ -31,10 +77,18 @@ Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Obj
     out.own_objects = objects;
     const auto number = [&](Node& node, sdf::Fault where) -> Result<void> {
         if (!has_file(node)) return {};
+        if (is_mesh(node)) {
+            const auto index = mesh_number(node.shape, folder, grids);
+            if (!index) {
+                if (fault) *fault = where;
+                return index.error();
+            }
+            node.shape.data = std::to_string(*index);
+            return {};
+        }
         auto found = grids.by_file.find(node.shape.data);
         if (found == grids.by_file.end()) {
-            const bool absolute = node.shape.data.starts_with('/');
-            auto grid = load_heights(absolute ? node.shape.data : folder + node.shape.data);
+            auto grid = load_heights(in_folder(folder, node.shape.data));
             if (!grid) {
                 if (fault) *fault = where;
                 return grid.error();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Height images of sampled shapes: loaded once each, and named by number in what the compiler reads.
+// Files of sampled shapes, height images and meshes: loaded once each, and named by number in what the compiler reads.
 #pragma once
 
+#include "model/bake.h"
 #include "sdf/program.h"
 
 #include <map>
@@ -14,7 +15,23 @@ namespace kiln::scene {
 struct Grids {
     std::vector<sdf::HeightGrid> grids;
     std::map<std::string, uint32_t> by_file;
+
+    /// What was found in a mesh, in the order of first use; beside `meshes`.
+    struct MeshNote {
+        std::string file;
+        int resolution = 0;
+        model::BakeReport report;
+    };
+    std::vector<sdf::MeshGrid> meshes;
+    std::vector<MeshNote> mesh_notes;
+    std::map<std::pair<std::string, int>, uint32_t> by_mesh;  ///< file and resolution
 };
+
+/// What stands in "file" of a sampled shape: an example and what it is.
+struct Resource {
+    std::string_view example, what;
+};
+Resource resource_of(uint16_t shape_kind);
 
 /// The grey values (of colours: red) of a PNG image, 0 for black and 1 for white, as they stand (no gamma).
 Result<sdf::HeightGrid> load_heights(const std::string& path);
@@ -27,7 +44,7 @@ struct GridSource {
     std::vector<Object> own_objects;
     const Grids* grids = nullptr;
 
-    sdf::Source source() const { return {edits, objects, grids->grids}; }
+    sdf::Source source() const { return {edits, objects, grids->grids, {}, 0, grids->meshes}; }
 };
 
 /// Loads what is missing from `grids`, which must outlive the result. `folder` is put before relative names.

@@ -2,6 +2,7 @@
 
 #include "scene/read_nodes.h"
 
+#include "scene/heights.h"
 #include "scene/suggest.h"
 
 #include "base/format.h"
@@ -75,7 +76,7 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     const std::string_view word = in_.doc.text(name);
     const auto kind = sdf::shape_kind(word);
     if (!kind) {
-        if (word == "mesh" || word == "expression")
+        if (word == "expression")
             return in_.fail(
                 name,
                 formatted("this version does not have the shape \"{}\" yet; use one of `kiln schema`'s shapes", word));
@@ -86,7 +87,8 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     const sdf::KindRow& row = sdf::shape_rows()[*kind];
     set_defaults(row, out.shape.params);
     if (row.how == sdf::KindRow::Sampled && !in_.doc.find(at, "file"))
-        return in_.fail(at, formatted("a {} needs a \"file\"; name a PNG image, relative to the scene file", row.name));
+        return in_.fail(at, formatted("a {} needs a \"file\"; name {}, relative to the scene file", row.name,
+                                      resource_of(*kind).what));
     return true;
 }
 
@@ -162,9 +164,10 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
                 continue;
             }
             if (key == "file" && shape_row->how == sdf::KindRow::Sampled) {
-                if (!in_.text(m, "heights.png", &out.shape.data)) return false;
+                const Resource resource = resource_of(out.shape.kind);
+                if (!in_.text(m, resource.example, &out.shape.data)) return false;
                 if (out.shape.data.empty())
-                    return in_.fail(m, "an empty name; name a PNG image, relative to the scene file");
+                    return in_.fail(m, formatted("an empty name; name {}, relative to the scene file", resource.what));
                 continue;
             }
         }

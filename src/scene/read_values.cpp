@@ -54,6 +54,12 @@ bool ValueReader::numbers(JsonIndex i, const sdf::FieldRow& row, float* out) {
         if (to) *to = v;
         return true;
     };
+    if (row.range == "flag") {
+        bool on = false;
+        if (!boolean(i, &on)) return false;
+        if (out) *out = on ? 1.0f : 0.0f;
+        return true;
+    }
     if (row.range == "axis") {
         for (size_t a = 0; a < kAxisNames.size(); ++a) {
             if (doc.text(i) != kAxisNames[a]) continue;

@@ -242,6 +242,7 @@ private:
         for (const sdf::FieldRow& f : row.fields()) {
             if (f.name != key || f.range == "internal") continue;
             if (f.range == "axis") return out_.add_text(kAxisNames[size_t(params[f.offset])], key);
+            if (f.range == "flag") return out_.add_bool(params[f.offset] != 0, key);
             return numbers(key, at, params + f.offset, f.arity);
         }
     }

@@ -4,6 +4,7 @@
 #include "scene/schema.h"
 
 #include "scene/format.h"
+#include "scene/heights.h"
 
 #include <nlohmann/json.hpp>
 
@@ -39,6 +40,7 @@ Json number_of(const sdf::FieldRow& row) {
     Json out;
     std::string_view range = row.range;
     if (range == "axis") return {{"enum", kAxisNames}};
+    if (range == "flag") return {{"type", "boolean"}};
     out["type"] = "number";
     if (range.starts_with("integer ")) {
         out["type"] = "integer";
@@ -71,6 +73,8 @@ Json numbers_of(const sdf::FieldRow& row) {
     out["description"] = doc;
     if (row.range == "axis") {
         out["default"] = kAxisNames[size_t(row.defaults[0])];
+    } else if (row.range == "flag") {
+        out["default"] = row.defaults[0] != 0;
     } else if (row.arity == 1) {
         out["default"] = tidy(row.defaults[0]);
     } else {
@@ -202,7 +206,10 @@ Json nodes_of(const Table& table) {
         for (const sdf::FieldRow& field : row.fields())
             if (field.range != "internal") properties[std::string(field.name)] = numbers_of(field);
         if (row.how == sdf::KindRow::Sampled) {
-            properties["file"] = {{"type", "string"}, {"description", "PNG image, relative to the scene file"}};
+            properties["file"] = {
+                {"type", "string"},
+                {"description", std::string(resource_of(uint16_t(&row - sdf::shape_rows().data())).what) +
+                                    ", relative to the scene file"}};
             required.push_back("file");
         }
         properties.update(common(false));

@@ -290,7 +290,7 @@ Result<uint32_t> World::Impl::compile_edit(const Edit& edit, uint64_t order, uin
         return Error{name + ": " + fault->message, fault->kind};
     auto source = scene::with_grids(std::span(&edit, 1), data.objects, data.folder, grids);
     if (!source) return Error{name + ": " + source.error().message, source.error().kind};
-    auto row = sdf::insert(list, source->edits[0], source->objects, grids.grids, order, owner);
+    auto row = sdf::insert(list, source->edits[0], source->objects, grids.grids, order, owner, nullptr, grids.meshes);
     if (!row) return Error{name + ": " + row.error().message, row.error().kind};
     return row;
 }

@@ -268,6 +268,23 @@ std::string World::inspect_json() const {
     out["bounds"] = box_json(program->bounds);
     out["unbounded"] = program->unbounded;
     out["instructions"] = program->tape().size();
+    Json meshes = Json::array();
+    for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes) {
+        const model::BakeReport& r = note.report;
+        meshes.push_back({{"file", note.file},
+                          {"resolution", note.resolution},
+                          {"found", r.sentence()},
+                          {"triangles", r.topology.triangles},
+                          {"sign", r.topology.closed_manifold() ? "closed manifold" : "winding number"},
+                          {"open_edges", r.topology.open_edges},
+                          {"non_manifold_edges", r.topology.non_manifold_edges},
+                          {"ambiguous_share", r.ambiguous_share},
+                          {"cell", r.cell},
+                          {"bricks", r.bricks},
+                          {"bytes", r.bytes},
+                          {"divisor", r.divisor}});
+    }
+    if (!meshes.empty()) out["meshes"] = meshes;
     if (auto built = impl_->field(field_settings)) {
         const field::Field& f = *built->field;
         const field::GridParams grid = f.grid();
@@ -282,6 +299,13 @@ std::string World::inspect_json() const {
         out["field_error"] = built.error().message;
     }
     return out.dump(2) + "\n";
+}
+
+std::vector<std::string> World::model_notes() const {
+    std::vector<std::string> out;
+    for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes)
+        out.push_back(formatted("{}: {}", note.file, note.report.sentence()));
+    return out;
 }
 
 std::vector<std::string> World::not_drawn_yet() const { return impl_->data.undrawn; }

@@ -443,6 +443,7 @@ void begin(Program& program) {
 void adopt_grids(Program& program, const Resolved& resolved) {
     program.samples.append(resolved.samples);
     program.grids = resolved.grids;
+    program.meshes = resolved.meshes;
 }
 
 }  // namespace
@@ -515,8 +516,10 @@ Result<Program> compile(const Source& source, Fault* fault) {
 }
 
 Result<uint32_t> insert(Program& program, const Edit& edit, std::span<const Object> objects,
-                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault) {
-    const Source source{{&edit, 1}, objects, grids, program.grids, uint32_t(program.samples.size())};
+                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault,
+                        std::span<const MeshGrid> meshes) {
+    const Source source{{&edit, 1}, objects,       grids, program.grids, uint32_t(program.samples.size()),
+                        meshes,     program.meshes};
     auto resolved = resolve(source, fault);
     if (!resolved) return resolved.error();
     begin(program);

@@ -108,6 +108,7 @@ public:
     AppendArray<EditSpan> edits;  ///< rows; which of them are in the world, `index` knows
     EditIndex index;              ///< the visible edits
     std::vector<GridPlace> grids;
+    std::vector<uint32_t> meshes;  ///< blocks of samples where each begins
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
     bool unbounded = false;  ///< some visible union edit has infinite bounds
@@ -134,13 +135,31 @@ struct HeightGrid {
     std::vector<float> values;
 };
 
+/// Signed distance of a mesh in its own unit: one sample every 7 cells everywhere, and bricks of 8x8x8 samples near the surface.
+/// 1-Lipschitz as it is interpolated (shapes/mesh.sdf.h), positive on and near the faces of its box.
+struct MeshGrid {
+    static constexpr int kBrickCells = 7;
+    static constexpr size_t kBlock = 512;  ///< samples of a brick
+    /// The solid keeps this many cells inside the box (shapes/mesh.sdf.h says the same).
+    static constexpr int kAirCells = 8;
+
+    vec3 lo, hi;                            ///< the box; the bricks reach a little beyond hi
+    float cell = 0;                         ///< side of a fine cell
+    int columns = 0, rows = 0, layers = 0;  ///< bricks along x, y, z
+    /// For each point of the coarse lattice (x fastest, one more than bricks on each axis) its value and the block of the brick that
+    /// begins there, or -1; padded to whole blocks. Then the bricks, a block each, x fastest.
+    std::vector<float> values;
+};
+
 /// What compile() reads.
 struct Source {
     std::span<const Edit> edits;
-    std::span<const Object> objects;      ///< ObjectId::index refers here
-    std::span<const HeightGrid> grids;    ///< Shape::data of a sampled shape is the decimal index of its grid
-    std::span<const GridPlace> placed{};  ///< the first grids, whose numbers a program holds already
-    uint32_t samples = 0;                 ///< how many numbers it holds
+    std::span<const Object> objects;            ///< ObjectId::index refers here
+    std::span<const HeightGrid> grids;          ///< Shape::data of a heightfield is the decimal index of its grid
+    std::span<const GridPlace> placed{};        ///< the first grids, whose numbers a program holds already
+    uint32_t samples = 0;                       ///< how many numbers it holds
+    std::span<const MeshGrid> meshes{};         ///< likewise for `mesh`
+    std::span<const uint32_t> placed_meshes{};  ///< blocks of the first meshes
 };
 
 /// Where compile() found a fault.
@@ -164,6 +183,7 @@ uint64_t order_between(uint64_t before, uint64_t after);
 /// Adds `edit` to the world as a new row, and answers its number; with place and objects as compile(). Fails as compile(), and changes
 /// nothing then. Costs what the edit costs. The owner's thread.
 Result<uint32_t> insert(Program& program, const Edit& edit, std::span<const Object> objects,
-                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault = nullptr);
+                        std::span<const HeightGrid> grids, uint64_t order, uint32_t owner, Fault* fault = nullptr,
+                        std::span<const MeshGrid> meshes = {});
 
 }  // namespace kiln::sdf

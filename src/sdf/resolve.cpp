@@ -29,6 +29,7 @@ namespace {
 
 constexpr float kSmallestRate = 1e-18f;
 
+bool is_mesh(const Shape& shape) { return ShapeKind(shape.kind) == ShapeKind::SampledMesh; }
 bool is_copies(const Warp& warp) { return warp_rows()[warp.kind].how == KindRow::Copies; }
 
 Error fail(Fault* fault, const Fault& where, std::string message) {
@@ -209,6 +210,17 @@ public:
             out_.grids.push_back({s.samples + uint32_t(out_.samples.size()), steepest_steps(grid)});
             out_.samples.insert(out_.samples.end(), grid.values.begin(), grid.values.end());
         }
+        out_.meshes.assign(s.placed_meshes.begin(), s.placed_meshes.end());
+        for (size_t i = s.placed_meshes.size(); i < s.meshes.size(); ++i) {
+            const size_t block = (s.samples + out_.samples.size() + MeshGrid::kBlock - 1) / MeshGrid::kBlock;
+            out_.meshes.push_back(uint32_t(block));
+            out_.samples.resize(block * MeshGrid::kBlock - s.samples);
+            out_.samples.insert(out_.samples.end(), s.meshes[i].values.begin(), s.meshes[i].values.end());
+        }
+        // Texts count samples in 32 bits.
+        if (s.samples + out_.samples.size() > size_t(1) << 31)
+            return fail(fault_, where_,
+                        "its height images and meshes have more than 2147483648 samples; lower \"resolution\"");
         collect_composites();
         const size_t objects = s.objects.size() + out_.composites.size();
         state_.assign(objects, Unseen);
@@ -334,12 +346,14 @@ private:
         return {};
     }
 
-    // Shape::data is the index of a grid with at least 2 x 2 values.
+    // Shape::data is the index of a grid with at least 2 x 2 values, or of a mesh.
     bool has_grid(const Shape& shape) const {
         size_t index = 0;
         const auto end = shape.data.data() + shape.data.size();
         const auto [rest, error] = std::from_chars(shape.data.data(), end, index);
-        if (error != std::errc{} || rest != end || index >= out_.source.grids.size()) return false;
+        if (error != std::errc{} || rest != end) return false;
+        if (is_mesh(shape)) return index < out_.source.meshes.size();
+        if (index >= out_.source.grids.size()) return false;
         const HeightGrid& grid = out_.source.grids[index];
         return grid.columns >= 2 && grid.rows >= 2 && grid.values.size() == size_t(grid.columns) * size_t(grid.rows);
     }
@@ -363,7 +377,9 @@ private:
             if (shape_rows()[node.shape.kind].how == KindRow::Sampled && !has_grid(node.shape)) {
                 return fail(fault_, where_, "refers to a file that was not loaded");
             }
-            box = shape_bounds(node.shape);
+            Shape shape = node.shape;
+            shape.params = out_.params_of(node.shape);
+            box = shape_bounds(shape);
         }
         out.stages.clear();
         out.factors.clear();
@@ -425,6 +441,24 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
     if (shape_rows()[shape.kind].how != KindRow::Sampled) return params;
     size_t index = 0;  // checked by the resolver
     std::from_chars(shape.data.data(), shape.data.data() + shape.data.size(), index);
+    if (is_mesh(shape)) {
+        const MeshGrid& mesh = source.meshes[index];
+        for (const FieldRow& field : shape_rows()[shape.kind].fields()) {
+            const size_t at = size_t(field.offset);
+            const auto put = [&](vec3 v) {
+                params[at] = v.x;
+                params[at + 1] = v.y;
+                params[at + 2] = v.z;
+            };
+            if (field.name == "first") params[at] = float(meshes[index]);
+            if (field.name == "lo") put(mesh.lo);
+            if (field.name == "hi") put(mesh.hi);
+            if (field.name == "cell") params[at] = mesh.cell;
+            if (field.name == "columns") params[at] = float(mesh.columns);
+            if (field.name == "rows") params[at] = float(mesh.rows);
+        }
+        return params;
+    }
     const HeightGrid& grid = source.grids[index];
     for (const FieldRow& field : shape_rows()[shape.kind].fields()) {
         if (field.range != "internal") continue;

@@ -38,8 +38,9 @@ struct Resolved {
     std::vector<std::vector<NodeBounds>> object_bounds;  ///< by object, by node
     std::vector<NodeBounds> edit_bounds;                 ///< by edit; empty stages for hidden edits
 
-    std::vector<float> samples;    ///< the grids that are not yet placed, one after another
+    std::vector<float> samples;    ///< the grids and meshes that are not yet placed, one after another
     std::vector<GridPlace> grids;  ///< all
+    std::vector<uint32_t> meshes;  ///< where each mesh begins among the program's samples, in blocks
 
     /// A shape's numbers with the internal fields of sampled shapes filled in.
     std::array<float, kMaxParams> params_of(const Shape& shape) const;

@@ -36,6 +36,8 @@ std::optional<std::string_view> out_of_range(const FieldRow& field, float value)
     std::string_view range = field.range;
     if (!std::isfinite(value)) return "must be a finite number";
     if (range == "any" || range == "internal") return std::nullopt;
+    if (range == "flag")
+        return value == 0 || value == 1 ? std::nullopt : std::optional<std::string_view>("must be 0 or 1");
     if (range == "axis") {
         return value == 0 || value == 1 || value == 2 ? std::nullopt
                                                       : std::optional<std::string_view>("must be x, y or z");

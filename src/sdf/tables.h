@@ -17,8 +17,9 @@ struct FieldRow {
     int arity = 0;   ///< 1, 2 or 3 numbers; 0 ends the list
     int offset = 0;  ///< of the first number in Shape::params
     std::array<float, 3> defaults{};
-    std::string_view unit;   ///< "m", "rad", "1/m", "rad/m", "1"
-    std::string_view range;  ///< "any", "> 0", ">= 0", "[a, b]", "(a, b]", "integer [a, b]", "axis", "internal"
+    std::string_view unit;  ///< "m", "rad", "1/m", "rad/m", "1"
+    std::string_view
+        range;  ///< "any", "> 0", ">= 0", "[a, b]", "(a, b]", "integer [a, b]", "axis", "flag" (true or false), "internal"
     std::string_view doc;
 };
 

@@ -97,6 +97,13 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"export potter -o -", "--format"},
         {"export potter -o - --format fbx", "no such format"},
         {"export potter -o a.glb --format stl", "leave --format out"},
+        {"import a.obj", "--output"},
+        {"import a.obj -o b.kiln.json --unit ft", "mm, cm, m or in"},
+        {"import a.obj -o b.kiln.json --up x", "y or z"},
+        {"import a.obj -o b.kiln.json --resolution 4", "between 8 and 512"},
+        {"import a.obj -o b.png", ".kiln.json"},
+        {"import a.fbx -o b.kiln.json", ".glb"},
+        {"import a.csg -o b.kiln.json", "later version"},
     };
     for (const auto& [words, says] : cases) {
         const Outcome o = run(words);
@@ -109,9 +116,33 @@ TEST_F(Cli, WrongUsageIsTwo) {
     EXPECT_EQ(run("").code, 2);
 }
 
+TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
+    write("tet.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+    const Outcome o = run("import tet.obj -o tet.kiln.json --unit cm --up z --resolution 24");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.out, "");
+    EXPECT_EQ(o.err, "tet.obj: closed manifold of 4 triangles\n");
+    const std::string first = read(folder_ / "tet.kiln.json");
+    EXPECT_THAT(first, HasSubstr("\"scale\": [0.01, 0.01, 0.01]"));
+    const Outcome valid = run("validate tet.kiln.json");
+    EXPECT_EQ(valid.code, 0) << valid.err;
+    EXPECT_THAT(valid.out, HasSubstr("tet.obj: closed manifold of 4 triangles"));
+    EXPECT_THAT(run("validate tet.kiln.json --json").out, HasSubstr("\"models\": [\"tet.obj: "));
+    EXPECT_THAT(run("inspect tet.kiln.json --json").out, HasSubstr("\"sign\": \"closed manifold\""));
+    // Nothing is written over unasked.
+    const Outcome again = run("import tet.obj -o tet.kiln.json");
+    EXPECT_EQ(again.code, 1);
+    EXPECT_THAT(again.err, HasSubstr("--force"));
+    EXPECT_EQ(read(folder_ / "tet.kiln.json"), first);
+    EXPECT_EQ(run("import tet.obj -o tet.kiln.json --force").code, 0);
+    EXPECT_NE(read(folder_ / "tet.kiln.json"), first);
+    EXPECT_EQ(run("import tet.obj -o none/tet.kiln.json").code, 1);
+    EXPECT_THAT(files(), testing::ElementsAre("tet.kiln.json", "tet.obj"));
+}
+
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
     for (const char* verb :
-         {"", "demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare", "export"}) {
+         {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema", "doctor", "compare"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;
         EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;
@@ -149,8 +180,9 @@ TEST_F(Cli, BadInputIsThreeWithPlaceAndMend) {
             EXPECT_THAT(files(), testing::ElementsAre("bad.kiln.json", "folder"));
         }
     }
-    for (const char* words : {"validate none.kiln.json", "validate folder", "validate potte",
-                              "query potter --points none.csv", "compare a.png b.png"}) {
+    for (const char* words :
+         {"validate none.kiln.json", "validate folder", "validate potte", "query potter --points none.csv",
+          "compare a.png b.png", "import none.obj -o a.kiln.json"}) {
         const Outcome o = run(words);
         EXPECT_EQ(o.code, 3) << words << o.err;
         expect_one_line(o, words);

@@ -13,6 +13,7 @@
 
 #include <memory>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,8 +48,9 @@ struct World {
     std::vector<Edit> edits;
     FieldOptions options;
     std::vector<sdf::HeightGrid> grids{};
+    std::vector<sdf::MeshGrid> meshes{};
 
-    sdf::Source source() const { return {edits, {}, grids}; }
+    sdf::Source source() const { return {.edits = edits, .objects = {}, .grids = grids, .meshes = meshes}; }
     std::shared_ptr<const Field> field() const {
         auto made = Field::build(compiled(source()), options);
         EXPECT_TRUE(made) << (made ? "" : made.error().message);

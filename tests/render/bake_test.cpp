@@ -3,6 +3,7 @@
 #include "bake_compare.h"
 #include "field/twenty_worlds.h"
 #include "gpu_worlds.h"
+#include "sdf/mesh_grid.h"
 
 #include <cmath>
 
@@ -46,6 +47,27 @@ TEST_F(BakeSlowGpu, TexelsOfTwentyWorldsAreTheCpusOwn) {
 TEST_F(BakeGpu, TexelsOfEveryShapeAndWarpAreTheCpusOwn) {
     expect_same(*runner_, field::worlds::every_shape(), Baker::Storage, field::DistanceFormat::Half);
     expect_same(*runner_, field::worlds::every_warp(), Baker::Storage, field::DistanceFormat::Half);
+}
+
+// Both levels of a mesh's grid, moved, cut and blended.
+TEST_F(BakeGpu, MeshesAreReadAsTheCpuReadsThem) {
+    field::worlds::World w;
+    w.name = "mesh";
+    w.meshes.push_back(sdf::ball_grid());
+    Edit mesh = field::worlds::edit(SampledMesh{}, {0.1f, 0, -0.05f});
+    mesh.node.shape.data = "0";
+    mesh.node.transform.scale = {1.5f, 1.5f, 1.5f};
+    mesh.node.material = MaterialId{1, 0};
+    // A layer over the mesh where only its coarse lattice is.
+    Edit layer = mesh;
+    layer.node.domain = {Round{.radius = 0.16f}};
+    layer.node.transform.position = {-0.4f, 0.8f, 0};
+    layer.node.material = MaterialId{2, 0};
+    w.edits = {mesh, layer, field::worlds::edit(Sphere{.radius = 0.4f}, {-0.3f, 0.3f, 0}, Op::Subtract, 0.1f)};
+    w.options.voxel_size = 0.04f;
+    w.options.bounds = {{-2.5f, -2, -2}, {2, 2.5f, 2}};
+    for (const Baker baker : {Baker::Storage, Baker::Copy})
+        expect_same(*runner_, w, baker, field::DistanceFormat::Half);
 }
 
 TEST_F(BakeGpu, MoreThanSixteenMaterialsKeepTheHeaviest) {

@@ -105,6 +105,9 @@ TEST(Schema, AgreesWithTheReader) {
         {"{\"shape\": \"sphere\", \"scale\": [1, 2]}", false},
         {"{\"shape\": \"sphere\", \"domain\": [{\"warp\": \"mirror\", \"axis\": 1}]}", false},
         {"{\"shape\": \"heightfield\"}", false},
+        {"{\"shape\": \"mesh\", \"resolution\": 64}", false},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"closed\": 1}", false},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"resolution\": 600}", false},
         {"{}", false},
     };
     for (const auto& [edit, good] : cases) {

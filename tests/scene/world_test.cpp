@@ -9,6 +9,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 
 namespace kiln {
@@ -170,6 +171,132 @@ TEST(World, HeightfieldsReadTheirImage) {
     EXPECT_THAT(world.error().message, testing::StartsWith(scene + ":1:"));
     EXPECT_THAT(world.error().message, testing::HasSubstr("missing.png"));
     EXPECT_EQ(world.error().kind, ErrorKind::Input);
+}
+
+// A cube of side 2, its triangles facing outwards.
+constexpr const char* kCube =
+    "v -1 -1 -1\nv 1 -1 -1\nv -1 1 -1\nv 1 1 -1\nv -1 -1 1\nv 1 -1 1\nv -1 1 1\nv 1 1 1\n"
+    "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+
+TEST(World, MeshesAreShapesAmongOthers) {
+    const std::string folder = testing::TempDir();
+    std::ofstream(folder + "/cube.obj") << kCube;
+    const std::string scene = folder + "/cube.kiln.json";
+    std::ofstream(scene) << scene_with(
+        "{\"shape\": \"mesh\", \"file\": \"cube.obj\", \"resolution\": 32, \"closed\": true, \"material\": \"a\","
+        " \"position\": [10, 0, 0], \"scale\": 2},"
+        "{\"shape\": \"sphere\", \"radius\": 1, \"position\": [12, 0, 0], \"op\": \"subtract\"},"
+        "{\"shape\": \"box\", \"position\": [10, 4, 0], \"half_extents\": [0.5, 2.5, 0.5], \"material\": \"b\"},"
+        "{\"shape\": \"mesh\", \"file\": \"cube.obj\", \"resolution\": 32, \"domain\": [{\"warp\": \"round\", "
+        "\"radius\": 0.1}]}",
+        "\"materials\": {\"a\": {}, \"b\": {}}");
+    const auto world = World::load(scene);
+    ASSERT_TRUE(world) << world.error().message;
+    EXPECT_LT(std::abs(world->distance({8, 1, 0})), 0.02f) << "a face of the moved, doubled cube";
+    EXPECT_LT(world->distance({8.5f, 1, 0}), -0.3f);
+    EXPECT_GT(world->distance({11.5f, 0, 0}), 0.1f) << "bitten by the sphere";
+    EXPECT_LT(world->distance({10, 5, 0}), 0) << "the box stands on it";
+    EXPECT_LT(std::abs(world->distance({0, 1.1f, 0.2f})), 0.03f) << "a rounded one";
+    EXPECT_EQ(world->material_name(world->sample({8.2f, 0, 0}).material), "a");
+    EXPECT_EQ(world->material_name(world->sample({10, 6, 0}).material), "b");
+    const Box3 bounds = world->bounds();
+    EXPECT_NEAR(bounds.max.x, 12, 0.3f);
+    // One file at one resolution is baked once.
+    EXPECT_THAT(world->model_notes(), testing::ElementsAre("cube.obj: closed manifold of 12 triangles"));
+    EXPECT_THAT(world->inspect_json(), testing::HasSubstr("\"sign\": \"closed manifold\""));
+    // What was saved reads back the same.
+    const auto again = World::parse(world->to_json(), scene);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->to_json(), world->to_json());
+    EXPECT_THAT(world->to_json(), testing::HasSubstr("\"closed\": true"));
+}
+
+TEST(World, MeshesMayComeLaterAndBesideHeightfields) {
+    const std::string folder = testing::TempDir();
+    std::ofstream(folder + "/cube.obj") << kCube;
+    const image::Pixels flat{
+        .width = 3, .height = 3, .channels = 1, .bits = 8, .values = std::vector<uint16_t>(9, 255)};
+    ASSERT_TRUE(image::write_png(folder + "/flat.png", flat));
+    World world;
+    Edit ground;
+    ground.node.shape = Heightfield{.size = {8, 8}, .height = 0.5f};
+    ground.node.shape.data = folder + "/flat.png";
+    ground.node.transform.position = {0, -3, 0};
+    Edit cube;
+    cube.node.shape = SampledMesh{.resolution = 20};
+    cube.node.shape.data = folder + "/cube.obj";
+    const auto check = [&](vec3 middle) {
+        EXPECT_LT(std::abs(world.distance(middle + vec3{0, 1, 0.3f})), 0.01f);
+        EXPECT_LT(world.distance(middle), -0.3f);
+        EXPECT_GT(world.distance(middle + vec3{0, 1.5f, 0}), 0.3f);
+    };
+    ASSERT_TRUE(world.add(cube));
+    check({});
+    ASSERT_TRUE(world.add(ground));
+    EXPECT_LT(std::abs(world.distance({3, -2.5f, 3})), 0.01f);
+    cube.node.transform.position = {10, 0, 0};
+    cube.node.shape = SampledMesh{.resolution = 30};
+    cube.node.shape.data = folder + "/cube.obj";
+    ASSERT_TRUE(world.add(cube));
+    check({10, 0, 0});
+    check({});
+    EXPECT_LT(std::abs(world.distance({3, -2.5f, 3})), 0.01f);
+    EXPECT_EQ(world.model_notes().size(), 2u) << "two resolutions";
+}
+
+TEST(World, MeshFaultsSayWhichFileAndWhere) {
+    const std::string folder = testing::TempDir(), scene = folder + "/m.kiln.json";
+    std::ofstream(folder + "/sheet.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+    std::ofstream(folder + "/broken.obj") << "v 0 0 0\nf 1 2 3\n";
+    const std::pair<const char*, const char*> files[] = {{"gone.obj", "gone.obj: cannot be read"},
+                                                         {"broken.obj", "broken.obj:2: "},
+                                                         {"sheet.obj", "encloses nothing"},
+                                                         {"m.kiln.json", "not a kind of model"}};
+    for (const auto& [file, says] : files) {
+        std::ofstream(scene) << scene_with("{\"shape\": \"mesh\", \"file\": \"" + std::string(file) + "\"}");
+        const auto world = World::load(scene);
+        ASSERT_FALSE(world) << file;
+        EXPECT_EQ(world.error().kind, ErrorKind::Input);
+        EXPECT_THAT(world.error().message, testing::StartsWith(scene + ":1:51: edits[0].file: ")) << file;
+        EXPECT_THAT(world.error().message, testing::HasSubstr(says));
+    }
+    const std::pair<const char*, const char*> keys[] = {
+        {"{\"shape\": \"mesh\"}", "needs a \"file\""},
+        {"{\"shape\": \"mesh\", \"file\": \"\"}", "name a model"},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"closed\": 1}", "true or false"},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"resolution\": 7}", "[8, 512]"},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"resolution\": 9.5}", "whole"},
+        {"{\"shape\": \"mesh\", \"file\": \"a.obj\", \"cell\": 1}", "unknown key"}};
+    for (const auto& [edit, says] : keys)
+        EXPECT_THAT(scene::fault_of(scene_with(edit)), testing::HasSubstr(says)) << edit;
+}
+
+TEST(World, ImportMakesASceneThatNamesItsModel) {
+    namespace fs = std::filesystem;
+    const fs::path folder = fs::path(testing::TempDir()) / "import";
+    fs::create_directories(folder / "models");
+    fs::create_directories(folder / "scenes");
+    std::ofstream(folder / "models/cube.obj") << kCube;
+    const std::string scene = (folder / "scenes/cube.kiln.json").string();
+    const auto world =
+        World::import((folder / "models/cube.obj").string(), scene, {.unit = 0.01f, .z_up = true, .resolution = 16});
+    ASSERT_TRUE(world) << world.error().message;
+    EXPECT_THAT(world->to_json(), testing::HasSubstr("\"../models/cube.obj\""));
+    ASSERT_TRUE(world->save(scene));
+    const auto loaded = World::load(scene);
+    ASSERT_TRUE(loaded) << loaded.error().message;
+    EXPECT_NEAR(loaded->distance({0, 0.03f, 0}), 0.02f, 0.004f);
+    ASSERT_EQ(loaded->cameras.size(), 1u);
+    // +Z of the file is up.
+    std::ofstream(folder / "models/tall.obj")
+        << "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 5\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    const auto tall = World::import((folder / "models/tall.obj").string(), scene, {.z_up = true, .resolution = 64});
+    ASSERT_TRUE(tall) << tall.error().message;
+    EXPECT_GT(tall->bounds().max.y, 4.9f);
+    EXPECT_LT(tall->bounds().max.z, 0.5f);
+    EXPECT_EQ(World::import("m.csg", scene).error().kind, ErrorKind::Usage);
+    EXPECT_EQ(World::import((folder / "gone.obj").string(), scene).error().kind, ErrorKind::Input);
+    fs::remove_all(folder);
 }
 
 TEST(World, NearestWord) {

@@ -28,6 +28,8 @@ void section(std::ostream& out, const KindRow& row, const char* key) {
         out << "| `" << field.name << "` | ";
         if (field.range == "axis") {
             out << '"' << "xyz"[int(field.defaults[0])] << '"';
+        } else if (field.range == "flag") {
+            out << (field.defaults[0] != 0 ? "true" : "false");
         } else if (field.arity == 1) {
             number(out, field.defaults[0]);
         } else {
@@ -37,8 +39,11 @@ void section(std::ostream& out, const KindRow& row, const char* key) {
             }
             out << ']';
         }
-        out << " | " << field.unit << " | " << (field.range == "axis" ? "x, y or z" : field.range) << " | " << field.doc
-            << " |\n";
+        out << " | " << field.unit << " | "
+            << (field.range == "axis"   ? "x, y or z"
+                : field.range == "flag" ? "true or false"
+                                        : field.range)
+            << " | " << field.doc << " |\n";
     }
     if (!any) out << "No fields: `{ \"" << key << "\": \"" << row.name << "\" }`.\n";
 }

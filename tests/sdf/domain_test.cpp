@@ -38,7 +38,7 @@ struct Bare {
             bounds = text32::shape_bounds(kind, w.data());
         } while (shape_rows()[kind].how == KindRow::Sampled || !std::isfinite(bounds.lo.x));
     }
-    double at(text64::real3 p) const { return text64::shape_distance(kind, p, w.data(), {kGrid}); }
+    double at(text64::real3 p) const { return text64::shape_distance(kind, p, w.data(), {samples_of(kind)}); }
 };
 
 // What the entry shows of p to the child: one point, or the nearest copies of it.

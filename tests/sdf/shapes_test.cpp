@@ -75,6 +75,42 @@ double ground(const Params& w, double x, double z) {
     return double(w[2]) * (a * (1 - (v - j)) + b * (v - j));
 }
 
+// The grid of ball_grid(), read by loops.
+bool in_mesh(const Point& p) {
+    static const MeshGrid grid = ball_grid();
+    const double lo[3] = {double(grid.lo.x), double(grid.lo.y), double(grid.lo.z)};
+    const double hi[3] = {double(grid.hi.x), double(grid.hi.y), double(grid.hi.z)};
+    int cell[3];
+    double at[3];
+    for (size_t a = 0; a < 3; ++a) {
+        if (p[a] < lo[a] || p[a] > hi[a]) return false;
+        at[a] = (p[a] - lo[a]) / double(grid.cell);
+        cell[a] = int(at[a] / 7);
+        at[a] -= 7 * cell[a];
+    }
+    const auto lattice = [&](int x, int y, int z) {
+        return size_t(2 * (cell[0] + x + (grid.columns + 1) * (cell[1] + y + (grid.rows + 1) * (cell[2] + z))));
+    };
+    const int block = int(grid.values[lattice(0, 0, 0) + 1]);
+    int first[3] = {};
+    for (size_t a = 0; a < 3; ++a) {
+        if (block < 0) at[a] /= 7;
+        if (block >= 0) first[a] = std::min(int(at[a]), 6);
+        at[a] -= first[a];
+    }
+    double sum = 0;
+    for (int c = 0; c < 8; ++c) {
+        const int d[3] = {c & 1, c >> 1 & 1, c >> 2};
+        double weight = 1;
+        for (size_t a = 0; a < 3; ++a) weight *= d[a] == 1 ? at[a] : 1 - at[a];
+        const size_t texel =
+            block < 0 ? lattice(d[0], d[1], d[2])
+                      : size_t(block) * 512 + size_t(first[0] + d[0] + 8 * (first[1] + d[1]) + 64 * (first[2] + d[2]));
+        sum += weight * double(grid.values[texel]);
+    }
+    return sum <= 0;
+}
+
 bool inside(std::string_view name, const Params& f, const Point& p) {
     double w[kMaxParams];
     std::copy(f.begin(), f.end(), w);
@@ -131,6 +167,7 @@ bool inside(std::string_view name, const Params& f, const Point& p) {
     if (name == "solid_angle") return size <= w[0] && std::atan2(r, y) <= w[1];
     if (name == "vesica") return std::hypot(r + std::min(w[1], w[0]), y) <= w[0];
     if (name == "heightfield") return ax <= 0.5 * w[0] && az <= 0.5 * w[1] && y >= -w[2] && y <= ground(f, x, z);
+    if (name == "mesh") return in_mesh(p);
     ADD_FAILURE() << "no independent definition of " << name << "; write one";
     return false;
 }
@@ -275,13 +312,15 @@ TEST_P(EachShape, EveryInstructionSetGivesTheSameBytes) {
     HeightGrid grid;
     grid.columns = grid.rows = kGridSide;
     grid.values.assign(std::begin(kGrid), std::end(kGrid));
+    const MeshGrid mesh = ball_grid();
     for_all(name() + ": same bytes", [&](Random& random) {
         Edit edit;
         edit.name = "shape";
         edit.node.shape.kind = uint16_t(kind());
         edit.node.shape.params = random.params(row());
         edit.node.shape.data = row().how == KindRow::Sampled ? "0" : "";
-        const Result<Program> program = compile({{&edit, 1}, {}, {&grid, 1}});
+        const Result<Program> program =
+            compile({.edits = {&edit, 1}, .objects = {}, .grids = {&grid, 1}, .meshes = {&mesh, 1}});
         RC_ASSERT(bool(program));
         const Around around(text32::shape_bounds(kind(), edit.node.shape.params.data()));
         constexpr int kCount = 77;

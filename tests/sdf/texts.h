@@ -2,6 +2,7 @@
 // The generated shape texts in float (with their host part) and in double, and random parameters made from the rows' own ranges.
 #pragma once
 
+#include "mesh_grid.h"
 #include "sdf/tables.h"
 
 #include <kiln/edit.h>
@@ -66,6 +67,17 @@ inline constexpr float kGrid[kGridSide * kGridSide] = {0.0f, 0.3f, 0.5f, 1.0f, 0
 inline constexpr float kGridStepX = 1.0f;
 inline constexpr float kGridStepZ = 0.8f;
 
+/// What a shape reads: the numbers above, or ball_grid() behind one block of others.
+inline const float* samples_of(uint32_t kind) {
+    static const std::vector<float> ball = [] {
+        std::vector<float> out(MeshGrid::kBlock, 7.0f);
+        const MeshGrid grid = ball_grid();
+        out.insert(out.end(), grid.values.begin(), grid.values.end());
+        return out;
+    }();
+    return shape_rows()[kind].name == "mesh" ? ball.data() : kGrid;
+}
+
 class Random {
 public:
     explicit Random(uint64_t seed) : engine_(seed) {}
@@ -78,6 +90,7 @@ public:
         const std::string range(field.range);
         if (range == "internal") return 0;
         if (range == "axis") return float(below(3));
+        if (range == "flag") return float(below(2));
         if (range == "any") return one_in(8) ? 0.0f : float(in(-2, 2));
         if (range == "> 0") return float(one_in(3) ? std::pow(10.0, in(-3, 2)) : in(0.05, 2));
         if (range == ">= 0") return one_in(5) ? 0.0f : float(in(0, 1.5));
@@ -99,6 +112,19 @@ public:
         for (const FieldRow& field : row.fields()) {
             for (int i = 0; i < field.arity; ++i) out[size_t(field.offset + i)] = value(field);
             if (field.name == "columns" || field.name == "rows") out[size_t(field.offset)] = kGridSide;
+            if (row.name == "mesh") {
+                static const MeshGrid grid = ball_grid();
+                const std::pair<const char*, std::array<float, 3>> numbers[] = {
+                    {"first", {1}},
+                    {"lo", {grid.lo.x, grid.lo.y, grid.lo.z}},
+                    {"hi", {grid.hi.x, grid.hi.y, grid.hi.z}},
+                    {"cell", {grid.cell}},
+                    {"columns", {float(grid.columns)}},
+                    {"rows", {float(grid.rows)}}};
+                for (const auto& [name, values] : numbers)
+                    for (int i = 0; field.name == name && i < field.arity; ++i)
+                        out[size_t(field.offset + i)] = values[size_t(i)];
+            }
             if (field.name == "step_x") out[size_t(field.offset)] = kGridStepX;
             if (field.name == "step_z") out[size_t(field.offset)] = kGridStepZ;
         }
@@ -137,10 +163,10 @@ inline std::string show(const Point& p) {
 }
 
 inline double distance64(uint32_t kind, const Params& w, const Point& p) {
-    return text64::shape_distance(kind, {p[0], p[1], p[2]}, w.data(), {kGrid});
+    return text64::shape_distance(kind, {p[0], p[1], p[2]}, w.data(), {samples_of(kind)});
 }
 inline double distance32(uint32_t kind, const Params& w, const Point& p) {
-    return double(text32::shape_distance(kind, {float(p[0]), float(p[1]), float(p[2])}, w.data(), {kGrid}));
+    return double(text32::shape_distance(kind, {float(p[0]), float(p[1]), float(p[2])}, w.data(), {samples_of(kind)}));
 }
 
 /// The box around a shape, infinite faces brought to 2 m, and its size.

@@ -46,6 +46,7 @@ KILN_SDF mask both(mask a, mask b) { return a && b; }
 KILN_SDF mask either(mask a, mask b) { return a || b; }
 KILN_SDF mask no(mask a) { return !a; }
 KILN_SDF real select(mask m, real a, real b) { return m ? a : b; }
+KILN_SDF whole select(mask m, whole a, whole b) { return m ? a : b; }
 KILN_SDF real2 select(mask m, real2 a, real2 b) { return m ? a : b; }
 KILN_SDF real3 select(mask m, real3 a, real3 b) { return m ? a : b; }
 

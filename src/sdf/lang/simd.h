@@ -47,6 +47,7 @@ KILN_SDF mask both(mask a, mask b) { return {a.v & b.v}; }
 KILN_SDF mask either(mask a, mask b) { return {a.v | b.v}; }
 KILN_SDF mask no(mask a) { return {~a.v}; }
 KILN_SDF real select(mask m, real a, real b) { return m.v ? a.v : b.v; }
+KILN_SDF whole select(mask m, whole a, whole b) { return m.v ? a.v : b.v; }
 
 // x86 min/max return the second operand unless the first is strictly less/greater: with the operands swapped that is
 // the language's rule, ties and signed zeros included.

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MIT
+// kiln import MODEL -o SCENE: a scene with the model as a mesh shape. Says on stderr what was found in the model.
+
+#include "cli/talk.h"
+#include "cli/verbs.h"
+
+#include <kiln/world.h>
+
+#include <array>
+#include <memory>
+#include <sys/stat.h>
+
+namespace kiln::cli {
+
+namespace {
+
+struct Options {
+    std::string model, output, unit = "m", up = "y";
+    int resolution = 128;
+    bool force = false;
+};
+
+struct Unit {
+    std::string_view name;
+    float metres;
+};
+constexpr std::array<Unit, 4> kUnits{{{"mm", 0.001f}, {"cm", 0.01f}, {"m", 1}, {"in", 0.0254f}}};
+
+int usage(const std::string& message) { return fail(Error{message, ErrorKind::Usage}); }
+
+int run_import(const Options& o) {
+    ImportSettings settings;
+    settings.unit = 0;
+    for (const Unit& unit : kUnits)
+        if (unit.name == o.unit) settings.unit = unit.metres;
+    if (settings.unit == 0) return usage("--unit " + o.unit + ": not a unit; write mm, cm, m or in");
+    if (o.up != "y" && o.up != "z") return usage("--up " + o.up + ": not an axis; write y or z");
+    if (o.resolution < 8 || o.resolution > 512)
+        return usage("--resolution " + std::to_string(o.resolution) + ": must be between 8 and 512");
+    if (!o.output.ends_with(".json")) return usage(o.output + ": a scene's name ends in .kiln.json");
+    settings.z_up = o.up == "z";
+    settings.resolution = o.resolution;
+    struct stat info {};
+    if (!o.force && ::stat(o.output.c_str(), &info) == 0)
+        return fail(Error{o.output + ": is there already; choose another name, or add --force to write over it",
+                          ErrorKind::Failed});
+    if (auto ok = writable(o.output); !ok) return fail(ok.error());
+    Progress progress;
+    progress.stage("reading " + o.model);
+    const auto world = World::import(o.model, o.output, settings);
+    if (!world) return fail(world.error());
+    if (auto saved = world->save(o.output); !saved) return fail(saved.error());
+    progress.stage("");
+    for (const std::string& note : world->model_notes()) say(note);
+    return finish_data();
+}
+
+}  // namespace
+
+void add_import(CLI::App& app, Run& run) {
+    auto o = std::make_shared<Options>();
+    CLI::App* verb = app.add_subcommand("import",
+                                        "Makes a scene of a model file. Needs no device.\n\n"
+                                        "Examples:\n"
+                                        "  kiln import bunny.obj -o bunny.kiln.json\n"
+                                        "  kiln import part.stl -o part.kiln.json --unit mm --up z");
+    verb->add_option("MODEL", o->model, "a .glb, .gltf, .obj, .off, .ply or .stl file")->required();
+    verb->add_option("-o,--output", o->output, "the scene to write, NAME.kiln.json")->required();
+    verb->add_option("--unit", o->unit, "of the file: mm, cm, m or in (glTF is in metres: leave it out)");
+    verb->add_option("--up", o->up, "the file's axis that points up: y, or z for most CAD files");
+    verb->add_option("--resolution", o->resolution, "cells along the longest side, 8 to 512");
+    verb->add_flag("--force", o->force, "writes over a scene that is there");
+    verb->callback([o, &run] { run = [o] { return run_import(*o); }; });
+}
+
+}  // namespace kiln::cli
