@@ -16,8 +16,9 @@
 namespace kiln::cli {
 namespace {
 
-constexpr std::string_view kVerbs[] = {"demo", "render", "query", "inspect", "validate", "schema", "doctor", "compare"};
-constexpr std::string_view kLaterVerbs[] = {"view", "edit", "export", "import", "simulate", "new", "diff", "bench"};
+constexpr std::string_view kVerbs[] = {"demo",   "render", "query",   "inspect", "validate",
+                                       "schema", "doctor", "compare", "bench"};
+constexpr std::string_view kLaterVerbs[] = {"view", "edit", "export", "import", "simulate", "new", "diff"};
 
 // In the list of verbs only the first line of each description; its own help shows all of it.
 class Help : public CLI::Formatter {
@@ -77,6 +78,7 @@ int run(int argc, char** argv) {
     add_schema(app, verb);
     add_doctor(app, verb);
     add_compare(app, verb);
+    add_bench(app, verb);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {
