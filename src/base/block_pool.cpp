@@ -59,7 +59,7 @@ struct Cache {
         }
         if (!free[c].empty()) return;
         const size_t bytes = (c + 1) * kStep, count = std::max<size_t>(kSlabBytes / bytes, 1);
-        auto* const slab = static_cast<std::byte*>(::operator new(count * bytes));
+        auto* const slab = static_cast<std::byte*>(::operator new(count* bytes));
         for (size_t i = count; i-- > 0;) free[c].push_back(slab + i * bytes);
     }
 

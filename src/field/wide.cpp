@@ -6,7 +6,7 @@
 #include "field/wide_isa.h"
 
 #include <array>
-#include <emmintrin.h>
+#include <immintrin.h>
 
 namespace kiln::field {
 namespace {

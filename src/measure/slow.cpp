@@ -74,10 +74,10 @@ Stored brute_force(const sdf::Program& program, const Field& field, uint64_t str
         const bool inside = d[0] < 0;
         bool occupied = false;
         for (int k = 0; k < kBrickTexelCount; ++k) {
-            occupied = occupied || std::fabs(d[k]) < h;
+            occupied = occupied || std::fabs(d[k]) < field.options().own_voxels * h;
             const bool own = (k & 7) < kBrickVoxels && ((k >> 3) & 7) < kBrickVoxels && (k >> 6) < kBrickVoxels;
             part.band_voxels += own && std::fabs(d[k]) < kPeerBandVoxels * h;
-            d[k] = half ? stored_half(d[k] / h) : stored_snorm8(d[k] / h);
+            d[k] = half ? stored_half(d[k] * (1.0f / h)) : stored_snorm8(d[k] * (1.0f / h));
         }
         part.checksum = checksum_of(cell.index, occupied, inside, d);
         part.bricks = occupied;
