@@ -2,14 +2,14 @@
 // Building the field: compile, cull, find the bricks (one thread), and bake them on the CPU. 256^3 voxels over [-1, 1]^3.
 // Peers on this recipe, kind 0, n = 1000: OpenVDB 1224 ms (batch CSG), libfive 630 ms; one core's roof is about 7 ms.
 
-#include "bench/recipes.h"
+#include "measure/recipes.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "sdf/eval.h"
 
 #include <benchmark/benchmark.h>
 
-namespace kiln::bench {
+namespace kiln::measure {
 namespace {
 
 field::FieldOptions options() {
@@ -102,4 +102,4 @@ BENCHMARK(one_edit)
     ->Unit(benchmark::kMicrosecond);
 
 }  // namespace
-}  // namespace kiln::bench
+}  // namespace kiln::measure

@@ -155,25 +155,41 @@ void append_name(std::string& out, std::string_view name) {
     out += '\n';
 }
 
-void answer_points(const World& world, const std::vector<Row>& rows, FieldSource source, std::string& out) {
+std::vector<vec3> points_of(const std::vector<Row>& rows) {
     std::vector<vec3> points;
     points.reserve(rows.size());
     for (const Row& r : rows) points.push_back({r.numbers[0], r.numbers[1], r.numbers[2]});
-    const std::vector<FieldSample> samples = world.sample(points, source);
+    return points;
+}
+
+void append_point(std::string& out, const Row& row, float distance, vec3 normal, std::string_view material) {
+    for (const std::string& t : row.text) out += t + ",";
+    for (const float v : {distance, normal.x, normal.y, normal.z}) append(out, v);
+    append_name(out, material);
+}
+
+void answer_points(const World& world, const std::vector<Row>& rows, FieldSource source, std::string& out) {
+    const std::vector<FieldSample> samples = world.sample(points_of(rows), source);
+    for (size_t i = 0; i < rows.size(); ++i)
+        append_point(out, rows[i], samples[i].distance, samples[i].normal, world.material_name(samples[i].material));
+}
+
+void answer_nearest(const World& world, const WorldView& view, const std::vector<Row>& rows, std::string& out) {
+    const std::vector<NearestPoint> nearest = view.nearest(points_of(rows));
     for (size_t i = 0; i < rows.size(); ++i) {
-        for (const std::string& t : rows[i].text) out += t + ",";
-        append(out, samples[i].distance);
-        append(out, samples[i].normal.x);
-        append(out, samples[i].normal.y);
-        append(out, samples[i].normal.z);
-        append_name(out, world.material_name(samples[i].material));
+        const NearestPoint& n = nearest[i];
+        append_point(out, rows[i], n.found ? n.distance : INFINITY, n.normal, world.material_name(n.material));
     }
 }
 
-void answer_rays(const World& world, const std::vector<Row>& rows, std::string& out) {
+void answer_rays(const World& world, const WorldView& view, const std::vector<Row>& rows, std::string& out) {
+    std::vector<Ray> rays;
+    rays.reserve(rows.size());
     for (const Row& r : rows) {
         const auto& n = r.numbers;
-        const RayHit hit = world.cast({.origin = {n[0], n[1], n[2]}, .direction = {n[3], n[4], n[5]}});
+        rays.push_back({.origin = {n[0], n[1], n[2]}, .direction = {n[3], n[4], n[5]}});
+    }
+    for (const RayHit& hit : view.cast(rays)) {
         if (!hit.hit) {
             out += "0,,,,,,,,\n";
             continue;
@@ -188,12 +204,8 @@ void answer_rays(const World& world, const std::vector<Row>& rows, std::string& 
 }
 
 int query(const Options& o) {
-    if (o.nearest) {
-        say("kiln query: --nearest comes with a later version; without it, distances are those of the ordered edits");
-        return kUsage;
-    }
-    if (o.bricks && o.rays) {
-        say("kiln query: --field and --rays do not go together; leave one out");
+    if (int(o.bricks) + int(o.rays) + int(o.nearest) > 1) {
+        say("kiln query: --field, --rays and --nearest do not go together; leave one out");
         return kUsage;
     }
     auto input = Input::open(o.points);
@@ -201,6 +213,7 @@ int query(const Options& o) {
     auto world = World::load(o.scene);
     if (!world) return fail(world.error());
     std::string out = o.rays ? "hit,t,x,y,z,nx,ny,nz,edit\n" : "x,y,z,distance,nx,ny,nz,material\n";
+    const WorldView view = world->view();
     std::vector<Row> rows;
     bool more = true;
     while (more) {
@@ -215,7 +228,9 @@ int query(const Options& o) {
             rows.push_back(row);
         }
         if (o.rays) {
-            answer_rays(*world, rows, out);
+            answer_rays(*world, view, rows, out);
+        } else if (o.nearest) {
+            answer_nearest(*world, view, rows, out);
         } else {
             answer_points(*world, rows, o.bricks ? FieldSource::Bricks : FieldSource::Exact, out);
         }
@@ -242,7 +257,7 @@ void add_query(CLI::App& app, Run& run) {
         ->required();
     verb->add_flag("--field", o->bricks, "from the bricks instead of the exact edits");
     verb->add_flag("--rays", o->rays, "rows are rays; answers hit,t,x,y,z,nx,ny,nz,edit");
-    verb->add_flag("--nearest", o->nearest, "true nearest-surface distance");
+    verb->add_flag("--nearest", o->nearest, "true nearest-surface distance, also where the edits' own value is less");
     verb->callback([o, &run] { run = [o] { return query(*o); }; });
 }
 

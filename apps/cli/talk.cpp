@@ -73,6 +73,13 @@ Progress::~Progress() {
     if (used_) std::fputs("\r\033[K", stderr);
 }
 
+void Progress::bar(std::string_view what, double done) {
+    constexpr int kWidth = 30;
+    const int filled = int(done * kWidth + 0.5);
+    const auto width = size_t(filled < 0 ? 0 : filled > kWidth ? kWidth : filled);
+    stage("[" + std::string(width, '#') + std::string(kWidth - width, '.') + "] " + std::string(what));
+}
+
 void Progress::stage(std::string_view what) {
     if (!shown_) return;
     used_ = true;

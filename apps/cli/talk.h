@@ -30,6 +30,8 @@ public:
     Progress();
     ~Progress();
     void stage(std::string_view what);
+    /// With a bar beside it; `done` is in [0, 1].
+    void bar(std::string_view what, double done);
 
 private:
     bool shown_ = false, used_ = false;

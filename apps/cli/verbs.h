@@ -21,5 +21,6 @@ void add_schema(CLI::App& app, Run& run);
 void add_doctor(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
+void add_bench(CLI::App& app, Run& run);
 
 }  // namespace kiln::cli

@@ -74,6 +74,9 @@ public:
     FieldSample sample(vec3 p_world, FieldSource source = FieldSource::Exact) const;
     std::vector<FieldSample> sample(std::span<const vec3> p_world, FieldSource source = FieldSource::Exact) const;
     RayHit cast(const Ray& ray) const;
+    /// What can be asked of the field as it is now, also from other threads while this world changes. Cheap: it holds the compiled
+    /// edits, which are compiled when they are first needed. A world that cannot be compiled is seen as empty.
+    WorldView view() const;
     const Material* material(MaterialId id) const;
     std::string_view material_name(MaterialId id) const;
 

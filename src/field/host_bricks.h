@@ -6,9 +6,14 @@
 #include "field/codes.gpu.h"
 #include "field/cubic.gpu.h"
 #include "field/field.h"
+#include "field/wide.h"
 
+#include <kiln/query.h>
+
+#include <atomic>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
@@ -30,6 +35,7 @@ public:
     Result<void> update(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes);
 
     const Field& field() const { return *field_; }
+    int texel_bytes() const { return field_->options().format == DistanceFormat::Half ? 2 : 1; }
     const std::shared_ptr<const Field>& shared_field() const { return field_; }
     /// Of a slot in use.
     const BrickContent& content(uint32_t slot) const { return contents_[slot]; }
@@ -52,6 +58,12 @@ public:
     /// Trilinear where a brick is and none of the eight texels is cut off at the band; elsewhere the exact program.
     Sample sample(dvec3 p_world, NormalKind kind = NormalKind::Dual) const;
 
+    /// Distances alone, metres, for many points at once: trilinear in bricks (where texels are cut off at the band, less than the
+    /// distance); in empty cells as far as the empty cells around reach, with the right sign: a lower bound of the size; 0 outside
+    /// the grid, where nothing is known. The same bits from every instruction set and from distance().
+    void distances(const sdf::Points& points, float* out, sdf::Isa isa = sdf::best_isa()) const;
+    float distance(vec3 p_world) const;
+
     struct Hit {
         int state = kMarchMiss;  ///< kMarchMiss, kMarchHit, kMarchInside
         double t = 0;            ///< metres
@@ -63,6 +75,9 @@ public:
              bool accelerate = true) const;
     /// The march alone, in voxels.
     MarchHit march(const TexelRay& ray, float t_min, float t_max, bool accelerate = true) const;
+    /// March of many rays at once, 16 (8, 4) neighbours of the list in step: give them in an order in which neighbours see the same.
+    /// Each hit has the bits of march() from 0 to the ray's t_max, but for the counters, which stay 0.
+    void march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
     /// Not normalised, per voxel, at p in the brick of a world cell ([0, 7]³).
     vec3 gradient(uint32_t slot, ivec3 cell, vec3 p, NormalKind kind) const;
 
@@ -75,8 +90,21 @@ private:
     void bake_slots(std::span<const uint32_t> slots, int workers);
     void surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, NormalKind kind, Sample& out) const;
 
+    // Plain tables of one state of the bricks for the wide loops, made when it is first asked: nanoseconds a cell and brick.
+    struct Tables {
+        std::atomic<bool> ready = false, solid_ready = false;
+        std::mutex mutex;
+        std::vector<uint32_t> cells;           // words by index in the grid
+        std::vector<const std::byte*> bricks;  // codes by slot; some brick's where a slot is free
+        std::vector<std::byte> solid;          // solid_mask() by slot
+    };
+    WideView wide_view() const;
+    void fill_tables() const;
+    void fill_solid() const;
+
     std::shared_ptr<const Field> field_;
-    Contents contents_;  // by slot
+    Contents contents_;                                            // by slot
+    std::shared_ptr<Tables> tables_ = std::make_shared<Tables>();  // of field_ and contents_ as they are
 };
 
 /// A world position as whole and fractional texel coordinates.

@@ -2,6 +2,7 @@
 
 #include "scene/exact.h"
 
+#include "sdf/nearest.h"
 #include "sdf/prune.h"
 
 #include "base/parallel_for.h"
@@ -14,63 +15,38 @@ namespace kiln::scene {
 namespace {
 
 dvec3 add(dvec3 a, dvec3 b, double s) { return {a.x + b.x * s, a.y + b.y * s, a.z + b.z * s}; }
+dvec3 to_double(vec3 p) { return {double(p.x), double(p.y), double(p.z)}; }
+bool finite(vec3 p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); }
 vec3 to_float(dvec3 p) { return {float(p.x), float(p.y), float(p.z)}; }
 double largest(dvec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
-
-// The part of a tape that matters in a ball, made again when a question leaves it.
-class Local {
-public:
-    explicit Local(const sdf::Program& program) : program_(program) {}
-
-    void move_to(dvec3 center, double radius) {
-        center_ = center;
-        radius_ = radius;
-        // The centre is rounded to float: a little more room for that.
-        sdf::prune(sdf::view(program_), to_float(center), float(radius + 1e-6 * largest(center)) * 1.001f, code_,
-                   scratch_);
-    }
-    bool covers(dvec3 p) const {
-        const dvec3 d = add(p, center_, -1);
-        return radius_ >= 0 && d.x * d.x + d.y * d.y + d.z * d.z <= radius_ * radius_;
-    }
-    double at(dvec3 p, sdf::MaterialMix* mix = nullptr, bool edits = false) const {
-        return sdf::evaluate(sdf::view(program_, code_), p, mix, edits);
-    }
-    std::span<const sdf::Instruction> code() const { return code_; }
-
-private:
-    const sdf::Program& program_;
-    std::vector<sdf::Instruction> code_;
-    sdf::PruneScratch scratch_;
-    dvec3 center_;
-    double radius_ = -1;  // nowhere yet
-};
 
 // Step of the central differences, metres: far above double's rounding, far below any detail.
 double gradient_step(dvec3 p) { return 1e-5 * (1 + 0.01 * largest(p)); }
 
-vec3 gradient(const Local& local, dvec3 p) {
+vec3 gradient(const sdf::Regions& regions, dvec3 p, sdf::Regions::Cursor& cursor) {
     const double h = gradient_step(p);
-    const double x = local.at({p.x + h, p.y, p.z}) - local.at({p.x - h, p.y, p.z});
-    const double y = local.at({p.x, p.y + h, p.z}) - local.at({p.x, p.y - h, p.z});
-    const double z = local.at({p.x, p.y, p.z + h}) - local.at({p.x, p.y, p.z - h});
+    const sdf::TapeView tape = regions.tape(p, cursor);  // right a margin around its region
+    const auto slope = [&](dvec3 above, dvec3 below) {
+        return sdf::evaluate(tape, above) - sdf::evaluate(tape, below);
+    };
+    const double x = slope({p.x + h, p.y, p.z}, {p.x - h, p.y, p.z});
+    const double y = slope({p.x, p.y + h, p.z}, {p.x, p.y - h, p.z});
+    const double z = slope({p.x, p.y, p.z + h}, {p.x, p.y, p.z - h});
     const double size = std::sqrt(x * x + y * y + z * z);
     if (!(size > 1e-6 * h)) return {0, 0, 0};
     return {float(x / size), float(y / size), float(z / size)};
 }
 
-FieldSample sample_one(Local& local, vec3 at) {
+FieldSample sample_one(const sdf::Regions& regions, vec3 at, sdf::Regions::Cursor& cursor) {
     FieldSample out;
-    const dvec3 p{double(at.x), double(at.y), double(at.z)};
-    local.move_to(p, 2 * gradient_step(p));
+    out.distance = std::numeric_limits<float>::infinity();
+    if (!finite(at)) return out;
+    const dvec3 p = to_double(at);
     sdf::MaterialMix mix;
-    const double d = local.at(p, &mix);
-    if (!(d < double(sdf::kEmptyTest))) {
-        out.distance = std::numeric_limits<float>::infinity();
-        return out;
-    }
+    const double d = sdf::evaluate(regions.tape(p, cursor), p, &mix);
+    if (!(d < double(sdf::kEmptyTest))) return out;
     out.distance = float(d);
-    out.normal = gradient(local, p);
+    out.normal = gradient(regions, p, cursor);
     out.material = material_of(mix.id0);
     return out;
 }
@@ -143,80 +119,208 @@ void clip(dvec3 o, dvec3 d, const Box3& box, double& from, double& to) {
     axis(o.z, d.z, double(box.min.z), double(box.max.z));
 }
 
+// How far a search for the nearest point may miss, metres: relative where floats are coarser.
+double tolerance_at(dvec3 p) { return std::max(5e-5, 2e-7 * largest(p)); }
+
+constexpr size_t kChunk = 64;  // questions that share a cursor
+
+// answer(i, cursor) for every i, on all cores.
+template <typename Answer>
+void for_each_question(size_t count, Answer&& answer) {
+    parallel_for((count + kChunk - 1) / kChunk, [&](int chunk) {
+        sdf::Regions::Cursor cursor = nullptr;
+        const size_t first = size_t(chunk) * kChunk;
+        for (size_t i = first; i < std::min(first + kChunk, count); ++i) answer(i, cursor);
+    });
+}
+
+// A ray in double precision, between where solids can be met.
+struct Way {
+    dvec3 origin, direction;
+    double from = 0, to = -1;
+
+    Way(const sdf::Program& program, double reach, const Ray& ray, double radius) {
+        const double length = std::sqrt(double(dot(ray.direction, ray.direction)));
+        if (!(length > 0) || !std::isfinite(length) || !finite(ray.origin) || !(ray.t_max >= 0) ||
+            program.index.size() == 0)
+            return;
+        origin = to_double(ray.origin);
+        direction = {double(ray.direction.x) / length, double(ray.direction.y) / length,
+                     double(ray.direction.z) / length};
+        to = std::min(double(ray.t_max), 1e10);
+        if (program.unbounded) return;
+        if (program.bounds.empty()) {
+            to = -1;
+            return;
+        }
+        const double around = reach + radius + 1e-3 * (1 + length_of(program.bounds));
+        clip(origin, direction, program.bounds.inflated(float(around)), from, to);
+    }
+    dvec3 at(double t) const { return add(origin, direction, t); }
+};
+
 }  // namespace
 
+ExactField::ExactField(const sdf::Program& program)
+    : program_(program), regions_(program), reach_(double(program.index.largest_reach())) {}
+
 double ExactField::distance(dvec3 p) const {
-    const double d = sdf::evaluate(sdf::view(program_), p);
+    sdf::Regions::Cursor cursor = nullptr;
+    return distance(p, cursor);
+}
+
+double ExactField::distance(dvec3 p, sdf::Regions::Cursor& cursor) const {
+    const double d = regions_.at(p, cursor);
     return d < double(sdf::kEmptyTest) ? d : std::numeric_limits<double>::infinity();
 }
 
+void ExactField::distance(std::span<const vec3> points, float* out) const {
+    for_each_question(points.size(), [&](size_t i, sdf::Regions::Cursor& cursor) {
+        out[i] =
+            finite(points[i]) ? float(distance(to_double(points[i]), cursor)) : std::numeric_limits<float>::infinity();
+    });
+}
+
 FieldSample ExactField::sample(vec3 p) const {
-    Local local(program_);
-    return sample_one(local, p);
+    sdf::Regions::Cursor cursor = nullptr;
+    return sample_one(regions_, p, cursor);
 }
 
 void ExactField::sample(std::span<const vec3> points, FieldSample* out) const {
-    constexpr size_t kChunk = 64;
-    parallel_for((points.size() + kChunk - 1) / kChunk, [&](int chunk) {
-        Local local(program_);
-        const size_t first = size_t(chunk) * kChunk;
-        for (size_t i = first; i < std::min(first + kChunk, points.size()); ++i) out[i] = sample_one(local, points[i]);
+    for_each_question(points.size(), [&](size_t i, sdf::Regions::Cursor& cursor) {
+        out[i] = sample_one(regions_, points[i], cursor);
     });
 }
 
 RayHit ExactField::cast(const Ray& ray) const {
-    RayHit out;
-    const double length = std::sqrt(double(dot(ray.direction, ray.direction)));
-    if (!(length > 0) || program_.index.size() == 0) return out;
-    const dvec3 o{double(ray.origin.x), double(ray.origin.y), double(ray.origin.z)};
-    const dvec3 dir{double(ray.direction.x) / length, double(ray.direction.y) / length,
-                    double(ray.direction.z) / length};
-    double t = 0, end = std::min(double(ray.t_max), 1e10);
-    double extent = 64;  // metres: how large the pruned balls are
-    if (!program_.unbounded) {
-        if (program_.bounds.empty()) return out;
-        const float reach = program_.index.largest_reach();  // smooth unions bulge beyond their operands
-        const Box3 box = program_.bounds.inflated(reach + 1e-3f * (1 + float(length_of(program_.bounds))));
-        extent = length_of(box);
-        clip(o, dir, box, t, end);
-        if (t > end) return out;
-    }
-    // Sphere tracing (Hart, 1996) on a 1-Lipschitz field, then bisection of the last step where it crossed.
-    Local local(program_);
-    double before = t;
+    sdf::Regions::Cursor cursor = nullptr;
+    return cast(ray, cursor);
+}
+
+void ExactField::cast(std::span<const Ray> rays, RayHit* out) const {
+    for_each_question(rays.size(), [&](size_t i, sdf::Regions::Cursor& cursor) { out[i] = cast(rays[i], cursor); });
+}
+
+// Sphere tracing (Hart, 1996) on a 1-Lipschitz field, then bisection of the last step where it crossed.
+RayHit ExactField::cast(const Ray& ray, sdf::Regions::Cursor& cursor) const {
+    const Way way(program_, reach_, ray, 0);
+    double t = way.from, before = t;
     bool hit = false;
-    for (int steps = 0; t <= end && steps < 200000; ++steps) {
-        const dvec3 p = add(o, dir, t);
-        if (!local.covers(p)) {
-            const double d = sdf::evaluate(sdf::view(program_), p);
-            local.move_to(p, std::max(1.5 * std::min(std::abs(d), extent), extent / 64));
-        }
-        const double d = local.at(p);
-        const double tolerance = 1e-7 * (1 + largest(p));
-        if (d <= tolerance) {
+    for (int steps = 0; t <= way.to && steps < 200000; ++steps) {
+        const dvec3 p = way.at(t);
+        const double d = regions_.at(p, cursor);
+        if (d <= 1e-7 * (1 + largest(p))) {
             hit = true;
             break;
         }
         before = t;
         t += d;
     }
-    if (!hit) return out;
-    if (local.at(add(o, dir, t)) < 0 && t > before) {
+    if (!hit) return {};
+    if (regions_.at(way.at(t), cursor) < 0 && t > before) {
         double low = before, high = t;
         for (int i = 0; i < 60; ++i) {
             const double middle = 0.5 * (low + high);
-            (local.at(add(o, dir, middle)) > 0 ? low : high) = middle;
+            (regions_.at(way.at(middle), cursor) > 0 ? low : high) = middle;
         }
         t = high;
     }
-    const dvec3 p = add(o, dir, t);
-    local.move_to(p, 4 * gradient_step(p));
+    RayHit out;
+    const dvec3 p = way.at(t);
     out.hit = true;
     out.t = float(t);
     out.position = to_float(p);
-    out.normal = gradient(local, p);
-    out.edit = {edit_at(program_, local.code(), p), 0};
+    out.normal = gradient(regions_, p, cursor);
+    out.edit = {edit_near(p, cursor), 0};
     return out;
+}
+
+// Conservative advancement (Mirtich, "Timewarp Rigid Body Simulation", 2000): by the program's value while that is far from the
+// radius, by the true distance near contact.
+RayHit ExactField::cast_sphere(const Ray& ray, float radius) const {
+    if (!(radius > 0)) return radius == 0 ? cast(ray) : RayHit{};
+    const double r = double(radius);
+    const Way way(program_, reach_, ray, r);
+    sdf::Regions::Cursor cursor = nullptr;
+    double t = way.from;
+    for (int steps = 0; t <= way.to && steps < 20000; ++steps) {
+        const dvec3 center = way.at(t);
+        const double touch = 0.4 * tolerance_at(center);
+        const double value = regions_.at(center, cursor);
+        if (value - r > touch) {
+            t += value - r;
+            continue;
+        }
+        sdf::Nearest near{.found = true, .distance = 0, .least = 0, .point = center};
+        if (value > 0) near = sdf::nearest_surface(regions_, center, 2 * r + touch, touch);
+        if (!near.found || near.distance - r > 2 * touch) {
+            t += std::max((near.found ? near.least : 2 * r) - r, touch);
+            continue;
+        }
+        RayHit out;
+        out.hit = true;
+        out.t = float(t);
+        out.position = to_float(near.point);
+        const dvec3 away = add(center, near.point, -1);
+        out.normal = value > 0 ? normalize(to_float(away)) : gradient(regions_, center, cursor);
+        out.edit = {edit_near(near.point, cursor), 0};
+        return out;
+    }
+    return {};
+}
+
+NearestPoint ExactField::nearest(vec3 p, float within) const {
+    sdf::Regions::Cursor cursor = nullptr;
+    return nearest(p, within, cursor);
+}
+
+void ExactField::nearest(std::span<const vec3> points, float within, NearestPoint* out) const {
+    for_each_question(points.size(),
+                      [&](size_t i, sdf::Regions::Cursor& cursor) { out[i] = nearest(points[i], within, cursor); });
+}
+
+NearestPoint ExactField::nearest(vec3 at, float within, sdf::Regions::Cursor& cursor) const {
+    if (!finite(at) || !(within >= 0)) return {};
+    const dvec3 p = to_double(at);
+    const sdf::Nearest near = sdf::nearest_surface(regions_, p, double(within), tolerance_at(p));
+    if (!near.found) return {};
+    NearestPoint out;
+    out.found = true;
+    const bool inside = regions_.at(p, cursor) < 0;
+    out.distance = float(inside ? -near.distance : near.distance);
+    out.error = float(near.distance - near.least);
+    out.position = to_float(near.point);
+    const dvec3 away = inside ? add(near.point, p, -1) : add(p, near.point, -1);
+    out.normal = near.distance > 1e-6 * (1 + largest(p)) ? to_float(away) / float(near.distance)
+                                                         : gradient(regions_, near.point, cursor);
+    sdf::MaterialMix mix;
+    (void)sdf::evaluate(regions_.tape(near.point, cursor), near.point, &mix);
+    out.material = material_of(mix.id0);
+    out.edit = {edit_near(near.point, cursor), 0};
+    return out;
+}
+
+bool ExactField::overlaps_sphere(vec3 center, float radius) const {
+    if (!finite(center) || !(radius >= 0)) return false;
+    const dvec3 c = to_double(center);
+    sdf::Regions::Cursor cursor = nullptr;
+    const double value = regions_.at(c, cursor);
+    if (value <= 0) return true;
+    if (!(value <= double(radius))) return false;
+    return sdf::nearest_surface(regions_, c, double(radius) + 0.5 * tolerance_at(c), 0.5 * tolerance_at(c)).found;
+}
+
+bool ExactField::overlaps_box(vec3 center, vec3 half, quat rotation) const {
+    if (!finite(center) || !finite(half) || !(half.x >= 0 && half.y >= 0 && half.z >= 0)) return false;
+    return sdf::solid_in_box(regions_, to_double(center), half, rotation, 2e-3 * double(length(half)));
+}
+
+uint32_t ExactField::edit_near(dvec3 p, sdf::Regions::Cursor& cursor) const {
+    thread_local std::vector<sdf::Instruction> code;
+    thread_local sdf::PruneScratch scratch;
+    const double radius = 4 * gradient_step(p);
+    sdf::prune(regions_.tape(p, cursor), to_float(p), float(radius + 1e-6 * largest(p)) * 1.001f, code, scratch);
+    return edit_at(program_, code, p);
 }
 
 }  // namespace kiln::scene

@@ -220,10 +220,12 @@ void World::Impl::number_all() {
     ids.clear();
     slots.clear();
     names.clear();
+    generations = {};
     names.reserve(data.edits.size());
     for (uint32_t i = 0; i < data.edits.size(); ++i) {
         ids.push_back({i, 0});
         slots.push_back({i, 0, i});
+        generations.resize_pages(i / generations.kPageSize + 1);
         names.emplace(data.edits[i].name, i);
     }
 }
@@ -232,6 +234,7 @@ EditId World::Impl::new_id(uint32_t position) {
     uint32_t slot = uint32_t(slots.size());
     if (free_slots.empty()) {
         slots.push_back({position, 0, field::kNoRow});
+        generations.resize_pages(slot / generations.kPageSize + 1);
     } else {
         slot = free_slots.back();
         free_slots.pop_back();
@@ -263,6 +266,7 @@ void World::Impl::rename(const std::string& old_name, const std::string& name, u
 void World::Impl::erase(uint32_t position) {
     const uint32_t slot = ids[position].index;
     slots[slot] = {UINT32_MAX, slots[slot].generation + 1, field::kNoRow};
+    generations.write(slot) = slots[slot].generation;
     free_slots.push_back(slot);
     names.erase(data.edits[position].name);
     data.edits.erase(data.edits.begin() + position);
@@ -316,6 +320,7 @@ uint64_t World::Impl::order_between(uint32_t before, uint32_t after) {
     {
         const std::lock_guard lock(mutex);
         program.reset();
+        asked.reset();
     }
     return between();
 }

@@ -49,6 +49,7 @@ void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     const std::lock_guard lock(mutex);
     program.reset();
     changes.push_back({removed, inserted});
+    asked.reset();
 }
 
 std::shared_ptr<const sdf::Program> World::Impl::compiled() {
@@ -168,28 +169,11 @@ Result<void> World::Impl::read_sky(const std::string& file) {
     return {};
 }
 
-float World::distance(vec3 p) const {
-    return float(scene::ExactField(*impl_->compiled()).distance({double(p.x), double(p.y), double(p.z)}));
-}
-
-FieldSample World::sample(vec3 p, FieldSource source) const { return sample(std::span(&p, 1), source).front(); }
-
-std::vector<FieldSample> World::sample(std::span<const vec3> points, FieldSource source) const {
-    std::vector<FieldSample> out(points.size());
-    for (FieldSample& s : out) s.distance = std::numeric_limits<float>::infinity();
-    if (source == FieldSource::Bricks && impl_->sample_bricks(points, field_settings, out.data())) return out;
-    scene::ExactField(*impl_->compiled()).sample(points, out.data());
-    return out;
-}
-
-RayHit World::cast(const Ray& ray) const {
-    const std::shared_ptr<const sdf::Program> program = impl_->compiled();
-    RayHit hit = scene::ExactField(*program).cast(ray);
-    if (hit.hit && hit.edit) {
-        const uint32_t slot = program->edits[hit.edit.index].owner;
-        hit.edit = {slot, impl_->slots[slot].generation};
-    }
-    return hit;
+std::shared_ptr<const WorldView::Impl> World::Impl::view() {
+    const std::shared_ptr<const sdf::Program> ready = compiled();
+    const std::lock_guard lock(mutex);
+    if (!asked || asked->program != ready) asked = std::make_shared<const WorldView::Impl>(ready, generations);
+    return asked;
 }
 
 Box3 World::bounds() const { return impl_->compiled()->bounds; }

@@ -2,10 +2,12 @@
 // What a World holds: the scene's data, ids of edits, and what was compiled from them.
 #pragma once
 
+#include "scene/exact.h"
 #include "scene/heights.h"
 #include "scene/scene_file.h"
 #include "scene/sky_image.h"
 
+#include "base/paged_array.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "render/lib/environment_map.h"
@@ -19,6 +21,22 @@
 #include <vector>
 
 namespace kiln {
+
+/// What a view holds; nothing in it changes.
+struct WorldView::Impl {
+    std::shared_ptr<const sdf::Program> program;
+    scene::ExactField exact;
+    PagedArray<uint32_t, 256> generations;  ///< by the number that a row's owner is
+
+    Impl(std::shared_ptr<const sdf::Program> compiled, PagedArray<uint32_t, 256> slots)
+        : program(std::move(compiled)), exact(*program), generations(std::move(slots)) {}
+    /// Of a row of the program, as ExactField names edits.
+    EditId id_of(EditId row) const {
+        if (!row) return {};
+        const uint32_t slot = program->edits[row.index].owner;
+        return {slot, generations[slot]};
+    }
+};
 
 struct World::Impl {
     struct Slot {
@@ -62,8 +80,10 @@ struct World::Impl {
 
     // Made when asked; under the mutex, because const functions may be called from any thread.
     std::mutex mutex;
-    sdf::Program list;                            ///< what the edits compile to; kept up with every change
-    std::shared_ptr<const sdf::Program> program;  ///< a snapshot of it
+    sdf::Program list;                             ///< what the edits compile to; kept up with every change
+    std::shared_ptr<const sdf::Program> program;   ///< a snapshot of it
+    std::shared_ptr<const WorldView::Impl> asked;  ///< answers about `program`
+    PagedArray<uint32_t, 256> generations;         ///< of slots, shared with views
     Built built;
     FieldSettings built_with;
     std::vector<field::RowChange> changes;            ///< since `built`
@@ -82,6 +102,7 @@ struct World::Impl {
     /// Compiles the whole list.
     Result<void> compile_all();
     std::shared_ptr<const sdf::Program> compiled();
+    std::shared_ptr<const WorldView::Impl> view();
     Result<Built> field(const FieldSettings& settings);
     /// Trilinear in bricks, exact elsewhere; false when there is no field.
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);

@@ -118,4 +118,41 @@ void store_halves(std::span<const float> values, float scale, float limit, float
     KILN_CHOOSE(isa, store_halves)(values.data(), values.size(), scale, limit, least, codes);
 }
 
+double zero_bound(const TapeView& tape, dvec3 p_world) {
+    exact::Registers r;
+    r.cell[0].v[0] = p_world.x;
+    r.cell[1].v[0] = p_world.y;
+    r.cell[2].v[0] = p_world.z;
+    const exact::Samples samples{tape.samples};
+    double least[kRegisters] = {};
+    for (const Instruction& in : tape.code) {
+        exact::run_distance(r, &in.word, 1, tape.params, samples);
+        if (in.moves_point()) continue;
+        const auto value = [&](uint32_t reg) { return std::abs(double(r.value[reg].v[0])); };
+        double& out = least[in.dst()];
+        switch (in.opcode()) {
+        case Opcode::Combine:
+            if ((in.aux() & 3u) == uint32_t(Op::Paint)) {
+                out = least[in.a()];
+            } else if (tape.params[in.param] > 0) {
+                out = value(in.dst());  // smooth: zeros of its own
+            } else {
+                out = std::max(value(in.dst()), std::min(least[in.a()], least[in.b()]));
+            }
+            break;
+        case Opcode::Move:
+        case Opcode::Negate:
+            out = least[in.a()];
+            break;
+        case Opcode::Take:
+            out = least[in.b()];
+            break;
+        default:
+            out = value(in.dst());
+            break;
+        }
+    }
+    return least[0];
+}
+
 }  // namespace kiln::sdf

@@ -48,6 +48,9 @@ void evaluate_materials(const TapeView& tape, const Points& points, float* out, 
                         Isa isa = best_isa());
 /// One point in double precision; the materials (or edits) too when `mix` is given.
 double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix = nullptr, bool edits = false);
+/// How near a zero of the tape can be to p at least, metres: a zero of hard operations is a zero of one of their operands, and each
+/// operand changes by no more than one moves.
+double zero_bound(const TapeView& tape, dvec3 p_world);
 
 /// Float evaluation is off by a few ulps of the coordinates and values involved; 2^-18 of their size covers 64 of them.
 inline constexpr float kPruneUlps = 3.8e-6f;

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -88,7 +89,6 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"render potter -o a.png --camera maim --size 8x8", "did you mean \"main\"?"},
         {"demo potte", "did you mean potter?"},
         {"query potter", "--points"},
-        {"query potter --points - --nearest", "later version"},
         {"export potter -o a.fbx", "end the name in .glb, .obj, .stl or .ply"},
         {"export potter -o a.glb --cell 0", "a length above 0"},
         {"export potter -o a.glb --cell 3parsec", "a length above 0"},
@@ -104,6 +104,12 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"import a.obj -o b.png", ".kiln.json"},
         {"import a.fbx -o b.kiln.json", ".glb"},
         {"import a.csg -o b.kiln.json", "later version"},
+        {"query potter --points - --nearest --field", "leave one out"},
+        {"query potter --points - --nearest --rays", "leave one out"},
+        {"bench feild", "--list"},
+        {"bench field --kind 3", "there is no kind 3"},
+        {"bench field --count 0", "between 1 and 1000000"},
+        {"bench field --threads 0", "--threads"},
     };
     for (const auto& [words, says] : cases) {
         const Outcome o = run(words);
@@ -142,7 +148,7 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
     for (const char* verb :
-         {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema", "doctor", "compare"}) {
+         {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema", "doctor", "compare", "bench"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;
         EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;
@@ -365,6 +371,48 @@ TEST_F(Cli, ExportWritesWholeFilesOrNone) {
     EXPECT_FALSE(fs::exists(folder_ / "a.glb"));
     EXPECT_EQ(run("export ball.kiln.json -o - --format ply --cell 0.1 >/dev/full || cp ball.stl failed").code, 0);
     EXPECT_TRUE(fs::exists(folder_ / "failed")) << "a full disk behind the pipe";
+}
+
+TEST_F(Cli, NearestIsTheTrueDistanceAlsoWhereTheEditsOnlyBoundIt) {
+    write("two.kiln.json",
+          "{\"format\": 1, \"edits\": [{\"shape\": \"sphere\", \"radius\": 1, \"position\": [-0.6, 0, 0]}, "
+          "{\"shape\": \"sphere\", \"radius\": 1, \"position\": [0.6, 0, 0]}]}");
+    write("p.csv", "x,y,z\n0,0,0\n0,2,0\n");
+    const Outcome o = run("query two.kiln.json --points p.csv --nearest");
+    EXPECT_EQ(o.code, 0) << o.err;
+    std::stringstream lines(o.out);
+    std::string header, inside, outside;
+    std::getline(lines, header);
+    std::getline(lines, inside);
+    std::getline(lines, outside);
+    EXPECT_EQ(header, "x,y,z,distance,nx,ny,nz,material");
+    EXPECT_THAT(inside, StartsWith("0,0,0,-0.8"));
+    EXPECT_NEAR(std::stod(inside.substr(6)), -0.8, 1e-4);
+    EXPECT_NEAR(std::stod(outside.substr(6)), std::hypot(2, 0.6) - 1, 1e-4);
+    // No surface, no distance; no rows, a header.
+    write("none.kiln.json", "{\"format\": 1, \"edits\": []}");
+    EXPECT_THAT(run("query none.kiln.json --points p.csv --nearest").out, HasSubstr("0,0,0,inf,0,0,0,"));
+    write("empty.csv", "");
+    for (const char* how : {"", "--nearest", "--field"})
+        EXPECT_EQ(run(std::string("query two.kiln.json --points empty.csv ") + how).out, header + "\n");
+    EXPECT_EQ(run("query two.kiln.json --points empty.csv --rays").out, "hit,t,x,y,z,nx,ny,nz,edit\n");
+}
+
+TEST_F(Cli, BenchNamesItsRowsAndAnswersOneObject) {
+    const Outcome list = run("bench --list");
+    EXPECT_EQ(list.code, 0);
+    for (const char* row :
+         {"field/bake", "field/edit.mean", "field/edit.worst", "field/undo", "field/memory.per_voxel"})
+        EXPECT_THAT(list.out, HasSubstr(row));
+    const Outcome o = run("bench field/memory.per_voxel --count 20 --seed 3 --kind 1 --json");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(o.err, "");  // no bar where nobody looks
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 1);
+    for (const char* key : {"\"machine\": ", "\"load\": ", "\"rows\": [", "\"name\": \"memory.per_voxel\"",
+                            "\"value\": ", "\"unit\": ", "\"threads\": 1",
+                            "\"peer\": ", "\"peer_value\": ", "\"ratio\": ", "\"roof_ratio\": ", "\"checksum\": \""})
+        EXPECT_THAT(o.out, HasSubstr(key));
+    EXPECT_THAT(run("bench field/memory.per_voxel --count 20").out, HasSubstr("of roof"));
 }
 
 }  // namespace

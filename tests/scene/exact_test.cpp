@@ -115,5 +115,73 @@ TEST(Exact, EmptySpaceIsInfinitelyFar) {
     EXPECT_FALSE(exact.cast({}).hit);
 }
 
+TEST(Exact, AMovingBallStopsWhereItTouches) {
+    const Compiled c = compiled(scene_with(
+        "{\"id\": \"ball\", \"shape\": \"sphere\", \"radius\": 1}, {\"id\": \"hole\", \"shape\": \"box\", \"op\": "
+        "\"subtract\", \"half_extents\": [0.3, 0.3, 2]}"));
+    const ExactField exact(c.program);
+    // Beside the hole: on the sphere. In front of it, too large: on the hole's rim. Small enough: straight through.
+    const RayHit side = exact.cast_sphere({.origin = {0.6f, 0, 5}, .direction = {0, 0, -1}}, 0.1f);
+    ASSERT_TRUE(side.hit);
+    EXPECT_NEAR(double(length(side.position)), 1, 1e-4);
+    EXPECT_NEAR(double(side.t), 5 - std::sqrt(1.1 * 1.1 - 0.36), 1e-4);
+    EXPECT_NEAR(double(dot(side.normal, vec3{0.6f / 1.1f, 0, std::sqrt(1.1f * 1.1f - 0.36f) / 1.1f})), 1, 1e-3);
+    EXPECT_EQ(side.edit.index, 0u);
+    const RayHit rim = exact.cast_sphere({.origin = {0, 0, 5}, .direction = {0, 0, -1}}, 0.5f);
+    ASSERT_TRUE(rim.hit);
+    const double z = std::sqrt(1 - 0.3 * 0.3);  // the rim's middles are the parts nearest to the axis
+    EXPECT_NEAR(double(rim.t), 5 - (z + std::sqrt(0.25 - 0.09)), 2e-4);
+    EXPECT_FALSE(exact.cast_sphere({.origin = {0, 0, 5}, .direction = {0, 0, -1}}, 0.29f).hit);
+    EXPECT_FALSE(exact.cast_sphere({.origin = {0, 0, 5}, .direction = {0, 0, -1}, .t_max = 3}, 0.5f).hit);
+    EXPECT_NEAR(double(exact.cast_sphere({.origin = {0.7f, 0, 5}, .direction = {0, 0, -1}}, 0).t),
+                double(exact.cast({.origin = {0.7f, 0, 5}, .direction = {0, 0, -1}}).t), 0);
+    // It starts in solid.
+    EXPECT_EQ(exact.cast_sphere({.origin = {0.7f, 0, 0}, .direction = {1, 0, 0}}, 0.1f).t, 0);
+}
+
+TEST(Exact, OverlapsFollowTheTrueDistance) {
+    const Compiled c = compiled(
+        scene_with("{\"shape\": \"sphere\", \"radius\": 1, \"position\": [-0.6, 0, 0]}, "
+                   "{\"shape\": \"sphere\", \"radius\": 1, \"position\": [0.6, 0, 0], \"op\": \"intersect\"}"));
+    const ExactField exact(c.program);
+    // Above the lens' rim (radius 0.8 in x = 0) the program's value is less than the true distance.
+    EXPECT_LT(exact.distance({0, 1.8, 0}), 0.92);
+    EXPECT_FALSE(exact.overlaps_sphere({0, 1.8f, 0}, 0.999f));
+    EXPECT_TRUE(exact.overlaps_sphere({0, 1.8f, 0}, 1.001f));
+    EXPECT_TRUE(exact.overlaps_sphere({0, 0, 0}, 0));
+    EXPECT_FALSE(exact.overlaps_box({0, 1.8f, 0}, {1, 0.98f, 1}, {}));
+    EXPECT_TRUE(exact.overlaps_box({0, 1.8f, 0}, {1, 1.01f, 1}, {}));
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    EXPECT_FALSE(exact.overlaps_sphere({nan, 0, 0}, 1));
+    EXPECT_FALSE(exact.nearest({nan, 0, 0}, 1).found);
+    EXPECT_FALSE(exact.cast({.origin = {0, nan, 0}}).hit);
+    EXPECT_FALSE(exact.cast_sphere({.origin = {0, 0, 5}, .direction = {0, 0, -1}}, nan).hit);
+}
+
+TEST(Exact, ABatchAnswersLikeOneByOne) {
+    const BundledScene& scene = bundled_files().front();
+    const Compiled c = compiled(std::string(scene.json));
+    const ExactField many(c.program);
+    std::mt19937 random(3);
+    const Box3 box = c.program.bounds.inflated(0.1f);
+    std::vector<vec3> points(500);
+    for (vec3& p : points)
+        p = {std::uniform_real_distribution<float>(box.min.x, box.max.x)(random),
+             std::uniform_real_distribution<float>(box.min.y, box.max.y)(random),
+             std::uniform_real_distribution<float>(box.min.z, box.max.z)(random)};
+    std::vector<FieldSample> samples(points.size());
+    std::vector<float> distances(points.size());
+    many.sample(points, samples.data());
+    many.distance(points, distances.data());
+    for (size_t i = 0; i < points.size(); ++i) {
+        const ExactField alone(c.program);  // whose regions nobody has asked
+        const FieldSample one = alone.sample(points[i]);
+        EXPECT_EQ(one.distance, samples[i].distance);
+        EXPECT_EQ(one.distance, distances[i]);
+        EXPECT_EQ(one.normal, samples[i].normal);
+        EXPECT_EQ(one.material, samples[i].material);
+    }
+}
+
 }  // namespace
 }  // namespace kiln::scene

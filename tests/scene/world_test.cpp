@@ -7,10 +7,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 namespace kiln {
 namespace {
@@ -321,6 +323,38 @@ TEST(WorldSlow, HundredsOfThousandsOfEditsLoad) {
     EXPECT_NEAR(world->distance({0, 1, -1}), 0.7f, 1e-5f);
     const auto frame = world->frame();
     ASSERT_TRUE(frame) << frame.error().message;
+}
+
+TEST(World, AViewStaysWhatItWasWhileTheWorldChanges) {
+    World world;
+    const EditId first = *world.add(ball(1));
+    const WorldView view = world.view();
+    std::atomic<bool> stop = false;
+    std::atomic<int> wrong = 0, asked = 0;
+    std::vector<std::thread> threads;
+    for (int t = 0; t < 3; ++t) {
+        threads.emplace_back([&] {
+            while (!stop) {
+                wrong += view.distance({0, 3, 0}) != 2;
+                const RayHit hit = view.cast({.origin = {0, 0, 5}, .direction = {0, 0, -1}});
+                wrong += !hit.hit || std::abs(hit.t - 4) > 1e-5f || hit.edit != first;
+                wrong += std::abs(view.nearest({0, 3, 0}).distance - 2) > 1e-4f;
+                ++asked;
+            }
+        });
+    }
+    for (int i = 0; i < 30 || asked < 30; ++i) {
+        const EditId other = *world.add(ball(1, {0, 2, 0}));
+        EXPECT_EQ(world.view().distance({0, 3, 0}), 0);
+        ASSERT_TRUE(world.remove(other));
+    }
+    stop = true;
+    for (std::thread& thread : threads) thread.join();
+    EXPECT_EQ(wrong, 0);
+    ASSERT_TRUE(world.remove(first));
+    EXPECT_TRUE(std::isinf(world.view().distance({0, 3, 0})));
+    EXPECT_FALSE(world.view().nearest({0, 3, 0}).found);
+    EXPECT_EQ(view.distance({0, 3, 0}), 2);
 }
 
 }  // namespace

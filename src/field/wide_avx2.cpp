@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// Points and rays through host bricks for AVX2: 8 lanes.
+
+#include "field/wide_isa.h"
+
+#include <immintrin.h>
+
+namespace kiln::field::wide_avx2 {
+
+constexpr int kLanes = 8;
+typedef float F __attribute__((vector_size(32)));
+typedef int32_t I __attribute__((vector_size(32)));
+
+#include "field/wide_masks.inl"
+
+static inline bool any(M m) { return _mm256_movemask_ps((__m256)m) != 0; }
+static inline F min(F a, F b) { return (F)_mm256_min_ps((__m256)b, (__m256)a); }  // as std::min
+static inline F max(F a, F b) { return (F)_mm256_max_ps((__m256)b, (__m256)a); }
+static inline F floor(F a) { return (F)_mm256_floor_ps((__m256)a); }
+static inline F sqrt(F a) { return (F)_mm256_sqrt_ps((__m256)a); }
+static inline I gather(const void* base, I index) {
+    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 4);
+}
+static inline I gather_bytes(const void* base, I index) {
+    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 1);
+}
+
+struct Pointers {
+    __m256i low, high;  // of the first and the last four lanes
+};
+static inline Pointers gather_pointers(const std::byte* const* table, I index) {
+    const auto* const from = reinterpret_cast<const long long*>(table);
+    return {_mm256_i32gather_epi64(from, _mm256_castsi256_si128((__m256i)index), 8),
+            _mm256_i32gather_epi64(from, _mm256_extracti128_si256((__m256i)index, 1), 8)};
+}
+static inline Pointers moved(const Pointers& p, I bytes) {
+    return {_mm256_add_epi64(p.low, _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)bytes))),
+            _mm256_add_epi64(p.high, _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)bytes, 1)))};
+}
+template <int kBytes>
+static inline I gather_from(const Pointers& p) {
+    const auto* const base = reinterpret_cast<const int*>(ptrdiff_t(kBytes));
+    return (I)_mm256_set_m128i(_mm256_i64gather_epi32(base, p.high, 1), _mm256_i64gather_epi32(base, p.low, 1));
+}
+
+#include "field/wide.inl"
+
+}  // namespace kiln::field::wide_avx2

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: MIT
+// Entry points of each instruction set, and what every wide_*.cpp includes before opening its namespace.
+#pragma once
+
+#include "field/codes.gpu.h"
+#include "field/wide.h"
+
+#include <cstring>
+
+#define KILN_DECLARE_WIDE(name)                                                        \
+    namespace kiln::field::name {                                                      \
+    void distances(const WideView& view, const sdf::Points& points, float* out);       \
+    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits); \
+    }
+KILN_DECLARE_WIDE(wide_scalar)
+KILN_DECLARE_WIDE(wide_sse4)
+KILN_DECLARE_WIDE(wide_avx2)
+KILN_DECLARE_WIDE(wide_avx512)
+#undef KILN_DECLARE_WIDE

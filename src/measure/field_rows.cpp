@@ -1,0 +1,545 @@
+// SPDX-License-Identifier: MIT
+// `bench field`: building, editing, asking and storing the field of the recipes, at `resolution` voxels over [-1, 1]^3.
+// Peers: OpenVDB and NanoVDB with a band of 3 voxels on each side where their plug-in is found (peers.h), else the figures that
+// they had on one core of an EPYC (Zen 5) at 4.1 GHz with kind 0, seed 5, 1000 edits and 256 voxels, marked "(anchor)".
+
+#include "measure/bench_run.h"
+
+#include "measure/contest.h"
+#include "measure/peers.h"
+#include "measure/recipes.h"
+#include "measure/roofs.h"
+#include "measure/slow.h"
+
+#include "base/parallel_for.h"
+#include "field/field.h"
+#include "field/host_bricks.h"
+#include "sdf/program.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <optional>
+
+namespace kiln::measure {
+namespace {
+
+using field::Field;
+using field::HostBricks;
+
+/// Point evaluations that the slow way may take for one field; above, it looks at every n-th cell.
+constexpr double kMostSlowWork = 4e10;
+constexpr int kEdits = 20;
+constexpr uint32_t kRandomPoints = 2000000;
+constexpr int kRayWidth = 640, kRayHeight = 360;
+
+/// A world that is edited, and its bricks.
+struct State {
+    sdf::Program list;
+    HostBricks bricks;
+    std::vector<uint32_t> rows;  // in the program, by position in the list
+};
+
+std::shared_ptr<const sdf::Program> program_of(std::span<const Edit> edits) {
+    return std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}}));
+}
+
+HostBricks made(std::shared_ptr<const sdf::Program> program, int resolution, int threads, float own_voxels = 1) {
+    field::FieldOptions options;
+    options.voxel_size = 2.0f / float(resolution);
+    options.bounds = {{-1, -1, -1}, {1, 1, 1}};
+    options.workers = threads;
+    options.own_voxels = own_voxels;
+    return *HostBricks::build(std::move(program), options);
+}
+
+/// One step of a history: the edit at a position before and after it; none: there is none.
+struct Step {
+    uint32_t position;
+    std::optional<Edit> before, after;
+
+    Step back() const { return {position, after, before}; }
+};
+
+void apply(State& state, const Step& step) {
+    field::RowChange change;
+    state.rows.resize(std::max<size_t>(state.rows.size(), step.position + 1), field::kNoRow);
+    uint32_t& row = state.rows[step.position];
+    if (step.before) {
+        change.removed = row;
+        state.list.remove(row);
+    }
+    if (step.after)
+        change.inserted = row =
+            *sdf::insert(state.list, *step.after, {}, {}, sdf::order_at(step.position), step.position);
+    (void)state.bricks.update(std::make_shared<const sdf::Program>(state.list), std::span(&change, 1));
+}
+
+class FieldRows {
+public:
+    FieldRows(BenchRun& run, int kind)
+        : run_(run),
+          kind_(kind),
+          edits_(recipe(kind, run.options.seed, run.options.count)),
+          program_(program_of(edits_)) {
+        const double points = std::pow(double(run.options.resolution) * 8 / 7, 3);
+        stride_ = std::max<uint64_t>(1, uint64_t(points * double(edits_.size()) / kMostSlowWork + 0.5));
+        anchored_ = kind == 0 && run.options.seed == 5 && run.options.count == 1000 && run.options.resolution == 256;
+    }
+
+    void all() {
+        const int cores = hardware_workers();
+        const int first = run_.options.threads > 0 ? run_.options.threads : 1;
+        measure(first);
+        if (run_.options.threads == 0 && cores > 1) measure_parallel(cores);
+    }
+
+private:
+    bool wanted(std::string_view row) const { return run_.wanted("field", row); }
+
+    void measure(int threads) {
+        if (wanted("bake")) bake(threads);
+        edit_rows(threads);
+        ask(threads);
+        if (wanted("memory.per_voxel")) memory();
+    }
+    void measure_parallel(int threads) {
+        if (wanted("bake")) bake(threads);
+        ask(threads);
+    }
+    void ask(int threads) {
+        if (wanted("samples.random")) samples("samples.random", start(), random_points(kRandomPoints), 8.5, threads);
+        if (wanted("samples.band")) samples("samples.band", wide_start(), band_points(), 39, threads);
+        if (wanted("query.single") && threads == 1) single();
+        if (wanted("rays")) rays(threads);
+    }
+
+    BenchRow row(std::string name, double value, std::string unit, int threads, bool more_is_better = false) const {
+        BenchRow out;
+        out.name = std::move(name);
+        out.value = value;
+        out.unit = std::move(unit);
+        out.threads = threads;
+        out.more_is_better = more_is_better;
+        out.kind = kind_;
+        out.seed = run_.options.seed;
+        out.count = run_.options.count;
+        return out;
+    }
+    static void compare(BenchRow& row, std::string peer, double value) {
+        row.peer = std::move(peer);
+        row.peer_value = value;
+        row.ratio = row.more_is_better ? row.value / value : value / row.value;
+    }
+    // A published figure, where nobody can be asked.
+    void anchor(BenchRow& row, std::string peer, double value) const {
+        if (anchored_ && row.threads == 1) compare(row, std::move(peer) + " (anchor)", value);
+    }
+
+    const HostBricks& start() {
+        if (!start_) start_ = std::make_unique<HostBricks>(made(program_, run_.options.resolution, 0));
+        return *start_;
+    }
+    // Owns its whole band of 3 voxels, so that every point of the band lies in a brick.
+    const HostBricks& wide_start() {
+        if (!wide_start_) wide_start_ = std::make_unique<HostBricks>(made(program_, run_.options.resolution, 0, 4));
+        return *wide_start_;
+    }
+    const Stored& slow() {
+        if (!slow_) slow_ = std::make_unique<Stored>(brute_force(*program_, start().field(), stride_));
+        return *slow_;
+    }
+    double voxel() const { return 2.0 / run_.options.resolution; }
+    void* peer_grid() {
+        if (!peer_ && peers() != nullptr) {
+            const std::vector<KilnPeerEdit> list = peer_edits(edits_);
+            peer_.reset(peers()->build(list.data(), uint32_t(list.size()), voxel(), hardware_workers()));
+        }
+        return peer_.get();
+    }
+
+    // Roots that baking some bricks cannot do without: one a texel and edit that a brick keeps.
+    static double roots_of(const Field& field, std::span<const uint32_t> slots) {
+        double roots = 0;
+        for (const uint32_t slot : slots) {
+            for (const sdf::Instruction& in : field.code_of(slot))
+                roots += in.opcode() == sdf::Opcode::Shape ? field::kBrickTexelCount : 0;
+        }
+        return roots;
+    }
+
+    void bake(int threads) {
+        run_.stage("bake");
+        HostBricks last;
+        std::vector<Contestant> turns{[&] {
+            last = {};
+            return seconds_of([&] { last = made(program_, run_.options.resolution, threads); });
+        }};
+        const std::vector<KilnPeerEdit> list = peer_edits(edits_);
+        if (peers() != nullptr)
+            turns.push_back([&] {
+                PeerGrid grid;
+                return seconds_of(
+                    [&] { grid.reset(peers()->build(list.data(), uint32_t(list.size()), voxel(), threads)); });
+            });
+        const std::vector<double> least = least_seconds(run_.options.runs, turns);
+        BenchRow out = row("bake", least[0] * 1e3, "ms", threads);
+        if (least.size() > 1) {
+            compare(out, peers()->tree_name, least[1] * 1e3);
+        } else {
+            anchor(out, "OpenVDB", 1224);
+        }
+        out.roof_ratio = roots_of(last.field(), last.field().slots()) / (roofs().roots * threads) / least[0];
+        run_.add_checked(out, stored(last, stride_).checksum, slow().checksum);
+    }
+
+    // ---- edits: each way to change the list, kEdits times over, from the changed list to bricks that hold it
+
+    // Positions of the list, empty where an edit was removed; what is added stands at the end.
+    using List = std::vector<std::optional<Edit>>;
+    using Change = void (*)(List& list, uint32_t m);
+
+    std::vector<Step> history(Change change) const {
+        std::vector<Step> out;
+        List list(edits_.begin(), edits_.end());
+        for (uint32_t m = 0; m < kEdits; ++m) {
+            const List before = list;
+            change(list, m);
+            for (size_t i = 0; i < list.size(); ++i) {
+                const std::optional<Edit> was = i < before.size() ? before[i] : std::nullopt;
+                if (was != list[i]) out.push_back({uint32_t(i), was, list[i]});
+            }
+        }
+        return out;
+    }
+    std::vector<Edit> after(const std::vector<Step>& steps) const {
+        List list(edits_.begin(), edits_.end());
+        for (const Step& step : steps) {
+            list.resize(std::max<size_t>(list.size(), step.position + 1));
+            list[step.position] = step.after;
+        }
+        std::vector<Edit> out;
+        for (const std::optional<Edit>& edit : list)
+            if (edit) out.push_back(*edit);
+        return out;
+    }
+
+    struct Turns {
+        std::vector<double> forwards = std::vector<double>(kEdits, 1e300);  // the least time of each edit, seconds
+        std::vector<double> backwards = forwards;
+        std::vector<double> peer = forwards;
+        uint64_t checksum = 0;  // after all edits
+        uint64_t undone = 0;    // after the undo of all of them
+        double roots = 0;       // a mean edit's
+    };
+
+    Turns take_turns(const std::vector<Step>& steps, bool with_peer, bool undo, int threads) {
+        Turns out;
+        const bool peer = with_peer && peer_grid() != nullptr;
+        State fresh{*program_, made(program_, run_.options.resolution, threads), {}};
+        for (uint32_t i = 0; i < edits_.size(); ++i) fresh.rows.push_back(i);
+        for (int turn = 0; turn < run_.options.runs; ++turn) {
+            State state = fresh;
+            PeerGrid grid(peer ? peers()->copy(peer_grid()) : nullptr);
+            out.roots = 0;
+            for (uint32_t m = 0; m < steps.size(); ++m) {
+                const auto least = [&](double& to, double seconds) { to = std::min(to, seconds); };
+                least(out.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
+                out.roots += roots_of(state.bricks.field(), state.bricks.field().jobs()) / kEdits;
+                if (!peer) continue;
+                const vec3 c = bite(m).node.transform.position;
+                const float center[3] = {c.x, c.y, c.z};
+                least(out.peer[m], seconds_of([&] { peers()->bite(grid.get(), center, kBiteRadius, threads); }));
+            }
+            if (turn == 0) out.checksum = stored(state.bricks).checksum;
+            if (!undo) continue;
+            for (uint32_t m = uint32_t(steps.size()); m-- > 0;) {
+                const double seconds = seconds_of([&] { apply(state, steps[m].back()); });
+                out.backwards[m] = std::min(out.backwards[m], seconds);
+            }
+            if (turn == 0) out.undone = stored(state.bricks).checksum;
+        }
+        return out;
+    }
+
+    static double mean(const std::vector<double>& values) {
+        double sum = 0;
+        for (const double v : values) sum += v;
+        return sum / double(values.size());
+    }
+
+    void edit_rows(int threads) {
+        const bool undo = wanted("undo");
+        if (wanted("edit.mean") || wanted("edit.worst") || undo) {
+            const auto bites = history([](List& list, uint32_t m) { list.push_back(bite(m)); });
+            run_.stage("edits");
+            const Turns turns = take_turns(bites, true, undo, threads);
+            const uint64_t slow_way = rebuilt(after(bites));
+            const auto edit_row = [&](std::string name, double seconds, double peer, double published) {
+                BenchRow out = row(std::move(name), seconds * 1e6, "µs", threads);
+                if (peer < 1e300) {
+                    compare(out, peers()->tree_name, peer * 1e6);
+                } else {
+                    anchor(out, "OpenVDB", published);
+                }
+                out.roof_ratio = turns.roots / roofs().roots / seconds;
+                return out;
+            };
+            if (wanted("edit.mean"))
+                run_.add_checked(edit_row("edit.mean", mean(turns.forwards), mean(turns.peer), 1450), turns.checksum,
+                                 slow_way);
+            if (wanted("edit.worst"))
+                run_.add_checked(edit_row("edit.worst", *std::ranges::max_element(turns.forwards),
+                                          *std::ranges::max_element(turns.peer), 1750),
+                                 turns.checksum, slow_way);
+            if (undo) {
+                BenchRow out = row("undo", mean(turns.backwards) * 1e6, "µs", threads);
+                out.roof_ratio = turns.roots / roofs().roots / mean(turns.backwards);
+                run_.add_checked(out, turns.undone, stored(start()).checksum);
+            }
+        }
+        struct Way {
+            const char* name;
+            Change change;
+        };
+        static constexpr Way kWays[] = {
+            {"edit.add",
+             [](List& list, uint32_t m) {
+                 Edit added = bite(m);
+                 added.op = Op::Union;
+                 list.push_back(added);
+             }},
+            {"edit.smooth",
+             [](List& list, uint32_t m) {
+                 Edit added = bite(m);
+                 added.op = Op::Union;
+                 added.blend_radius = kSmoothRadius;
+                 list.push_back(added);
+             }},
+            {"edit.move",
+             [](List& list, uint32_t m) { list[lb32(m) % list.size()]->node.transform.position.x += kBiteRadius; }},
+            {"edit.remove",
+             [](List& list, uint32_t m) {
+                 size_t at = lb32(m) % list.size();
+                 for (size_t i = 0; i < list.size() && !list[at]; ++i) at = (at + 1) % list.size();
+                 list[at].reset();
+             }},
+        };
+        for (const Way& way : kWays) {
+            if (!wanted(way.name)) continue;
+            run_.stage(way.name);
+            const std::vector<Step> steps = history(way.change);
+            const Turns turns = take_turns(steps, false, false, threads);
+            BenchRow out = row(way.name, mean(turns.forwards) * 1e6, "µs", threads);
+            out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
+            run_.add_checked(out, turns.checksum, rebuilt(after(steps)));
+        }
+    }
+
+    uint64_t rebuilt(std::span<const Edit> edits) const {
+        return stored(made(program_of(edits), run_.options.resolution, 0)).checksum;
+    }
+
+    // ---- questions, of the baked bricks
+
+    struct Cloud {
+        std::vector<float> x, y, z;
+        explicit Cloud(std::span<const vec3> points) {
+            for (const vec3& p : points) {
+                x.push_back(p.x);
+                y.push_back(p.y);
+                z.push_back(p.z);
+            }
+        }
+        sdf::Points points() const { return {x.data(), y.data(), z.data(), int(x.size())}; }
+    };
+
+    // The lattice points of bricks with |d| < 3 voxels, brick by brick, moved to (0.3, 0.4, 0.6) of their voxel.
+    std::vector<vec3> band_points() {
+        const HostBricks& bricks = wide_start();
+        const float h = bricks.field().grid().voxel_size;
+        std::vector<vec3> out;
+        for (const uint32_t slot : bricks.field().slots()) {
+            const field::BrickRecord record = bricks.field().records()[slot];
+            for (int i = 0; i < 343; ++i) {
+                const int x = i % 7, y = i / 7 % 7, z = i / 49;
+                if (!(std::abs(bricks.texel(slot, x, y, z)) < 3)) continue;
+                out.push_back({(float(record.texel_x + x) + 0.3f) * h, (float(record.texel_y + y) + 0.4f) * h,
+                               (float(record.texel_z + z) + 0.6f) * h});
+            }
+        }
+        return out;
+    }
+
+    static uint64_t checksum_of(std::span<const float> values) { return hash64_of(values); }
+
+    // Answers one point at a time, with other code than the wide loops.
+    static std::vector<float> one_by_one(const HostBricks& bricks, std::span<const vec3> points) {
+        std::vector<float> out(points.size());
+        parallel_for(
+            points.size(), 0, [&](int i) { out[size_t(i)] = bricks.distance(points[size_t(i)]); }, 4096);
+        return out;
+    }
+
+    void samples(const char* name, const HostBricks& bricks, const std::vector<vec3>& points, double published,
+                 int threads) {
+        run_.stage(name);
+        const Cloud cloud(points);
+        std::vector<float> out(points.size()), peer(points.size());
+        constexpr int kPiece = 1 << 14;
+        const int pieces = (int(points.size()) + kPiece - 1) / kPiece;
+        std::vector<Contestant> turns{[&] {
+            return seconds_of([&] {
+                parallel_for(pieces, threads, [&](int piece) {
+                    const int first = piece * kPiece, count = std::min(kPiece, int(points.size()) - first);
+                    const sdf::Points all = cloud.points();
+                    bricks.distances({all.x + first, all.y + first, all.z + first, count}, out.data() + first);
+                });
+            });
+        }};
+        if (threads == 1 && peer_grid() != nullptr)
+            turns.push_back([&] {
+                return seconds_of([&] { peers()->sample_flat(peer_grid(), &points[0].x, points.size(), peer.data()); });
+            });
+        const std::vector<double> least = least_seconds(run_.options.runs, turns);
+        BenchRow row_out = row(name, double(points.size()) / least[0] / 1e6, "M/s", threads, true);
+        if (least.size() > 1) {
+            compare(row_out, peers()->flat_name, double(points.size()) / least[1] / 1e6);
+        } else {
+            anchor(row_out, "NanoVDB", published);
+        }
+        // A cell word and four pairs of texels a point must be gathered.
+        row_out.roof_ratio = 5 * double(points.size()) / (roofs().gathers * threads) / least[0];
+        run_.add_checked(row_out, checksum_of(out), checksum_of(one_by_one(bricks, points)));
+    }
+
+    // One point a call, each by itself; the slow way goes through samples of eight corners.
+    void single() {
+        run_.stage("query.single");
+        const HostBricks& bricks = start();
+        const std::vector<vec3> points = random_points(kRandomPoints);
+        std::vector<float> out(points.size()), peer(points.size()), slow_way(points.size());
+        std::vector<Contestant> turns{[&] {
+            return seconds_of([&] {
+                for (size_t i = 0; i < points.size(); ++i) out[i] = bricks.distance(points[i]);
+            });
+        }};
+        if (peer_grid() != nullptr)
+            turns.push_back([&] {
+                return seconds_of([&] {
+                    for (size_t i = 0; i < points.size(); ++i)
+                        peers()->sample_flat(peer_grid(), &points[i].x, 1, &peer[i]);
+                });
+            });
+        const std::vector<double> least = least_seconds(run_.options.runs, turns);
+        BenchRow row_out = row("query.single", double(points.size()) / least[0] / 1e6, "M/s", 1, true);
+        if (least.size() > 1) {
+            compare(row_out, peers()->flat_name, double(points.size()) / least[1] / 1e6);
+        } else {
+            anchor(row_out, "NanoVDB", 8.5);
+        }
+        row_out.roof_ratio = 5 * double(points.size()) / roofs().gathers / least[0];
+        const Cloud cloud(points);
+        bricks.distances(cloud.points(), slow_way.data(), sdf::Isa::Scalar);
+        run_.add_checked(row_out, checksum_of(out), checksum_of(slow_way));
+    }
+
+    static uint64_t checksum_of(std::span<const field::MarchHit> hits) {
+        uint64_t sum = 0;
+        for (const field::MarchHit& hit : hits)
+            sum = hash_combine(sum, uint64_t(hit.state) << 32 | std::bit_cast<uint32_t>(hit.t));
+        return sum;
+    }
+
+    void rays(int threads) {
+        run_.stage("rays");
+        const HostBricks& bricks = start();
+        const std::vector<Ray> list = picture_rays_in_tiles(kRayWidth, kRayHeight);
+        std::vector<field::MarchHit> hits(list.size()), slow_way(list.size());
+        constexpr int kPiece = 1024;
+        const int pieces = (int(list.size()) + kPiece - 1) / kPiece;
+        bricks.march(std::span(list).first(1), hits.data());  // makes what rays keep beside the bricks
+        std::vector<Contestant> turns{[&] {
+            return seconds_of([&] {
+                parallel_for(pieces, threads, [&](int piece) {
+                    const size_t first = size_t(piece) * kPiece, count = std::min<size_t>(kPiece, list.size() - first);
+                    bricks.march(std::span(list).subspan(first, count), hits.data() + first);
+                });
+            });
+        }};
+        std::vector<float> flat, t(list.size());
+        for (const Ray& ray : list) {
+            for (const float v :
+                 {ray.origin.x, ray.origin.y, ray.origin.z, ray.direction.x, ray.direction.y, ray.direction.z})
+                flat.push_back(v);
+        }
+        if (threads == 1 && peer_grid() != nullptr)
+            turns.push_back([&] {
+                return seconds_of([&] { (void)peers()->cast_flat(peer_grid(), flat.data(), list.size(), t.data()); });
+            });
+        const std::vector<double> least = least_seconds(run_.options.runs, turns);
+        BenchRow out = row("rays", double(list.size()) / least[0] / 1e6, "M/s", threads, true);
+        if (least.size() > 1) {
+            compare(out, peers()->flat_name, double(list.size()) / least[1] / 1e6);
+        } else {
+            anchor(out, "NanoVDB", 2.4);
+        }
+        double voxels = 0, cells = 0;
+        for (size_t i = 0; i < list.size(); ++i) {
+            const Ray& r = list[i];
+            const field::TexelRay texels =
+                field::texel_ray_of({double(r.origin.x), double(r.origin.y), double(r.origin.z)}, r.direction,
+                                    bricks.field().grid().voxel_size);
+            slow_way[i] = bricks.march(texels, 0, field::kFarVoxels, false);  // every cell, no jumps
+            voxels += slow_way[i].voxels;
+            cells += slow_way[i].cells;
+        }
+        // Operations of finding out where a ray leaves a voxel or a cell; solving the few cubics comes on top.
+        constexpr double kStepFlops = 20;
+        out.roof_ratio = kStepFlops * (voxels + cells) / (roofs().flops * threads) / least[0];
+        run_.add_checked(out, checksum_of(hits), checksum_of(slow_way));
+    }
+
+    void memory() {
+        run_.stage("memory");
+        const HostBricks& bricks = start();
+        const Stored mine = stored(bricks, stride_);
+        const double bytes = double(mine.bricks) * field::kBrickTexelCount * bricks.texel_bytes();
+        BenchRow out = row("memory.per_voxel", bytes / double(std::max<uint64_t>(slow().band_voxels, 1)), "B", 1);
+        if (peer_grid() != nullptr) {
+            uint64_t voxels = 0, size = 0;
+            peers()->measure(peer_grid(), &voxels, &size);
+            compare(out, peers()->tree_name, double(size) / double(std::max<uint64_t>(voxels, 1)));
+        } else {
+            anchor(out, "OpenVDB", 11.6);
+        }
+        out.roof_ratio = double(bricks.texel_bytes()) / out.value;
+        run_.add_checked(out, hash_combine(mine.checksum, mine.bricks), hash_combine(slow().checksum, slow().bricks));
+    }
+
+    BenchRun& run_;
+    const int kind_;
+    const std::vector<Edit> edits_;
+    const std::shared_ptr<const sdf::Program> program_;
+    uint64_t stride_ = 1;
+    bool anchored_ = false;
+    std::unique_ptr<HostBricks> start_, wide_start_;
+    std::unique_ptr<Stored> slow_;
+    PeerGrid peer_;
+};
+
+}  // namespace
+
+BenchFamily field_family() {
+    return {{"field",
+             "the field of 1000 spheres and boxes: building, editing, sampling, rays, memory",
+             {"bake", "edit.mean", "edit.worst", "undo", "edit.add", "edit.smooth", "edit.move", "edit.remove",
+              "samples.random", "samples.band", "query.single", "rays", "memory.per_voxel"}},
+            [](BenchRun& run) {
+                for (const int kind : run.options.kinds)
+                    if (!run.fault()) FieldRows(run, kind).all();
+            }};
+}
+
+}  // namespace kiln::measure

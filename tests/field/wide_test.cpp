@@ -1,0 +1,223 @@
+// SPDX-License-Identifier: MIT
+// Wide loops against one at a time: the same bits, from every instruction set, in both formats, for points and rays of all kinds.
+#include "field/wide.h"
+
+#include "field/host_bricks.h"
+#include "field/worlds.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <random>
+
+namespace kiln::field {
+namespace {
+
+using worlds::edit;
+
+HostBricks bricks_of(DistanceFormat format, std::span<const Edit> edits) {
+    FieldOptions options;
+    options.voxel_size = 0.03f;
+    options.bounds = {{-1.2f, -1, -1}, {1, 1.1f, 1}};
+    options.format = format;
+    return HostBricks::bake(
+        *Field::build(std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}})), options));
+}
+
+// Balls, a thin wall, a cut, a solid whose middle has no bricks.
+std::vector<Edit> mixed() {
+    std::mt19937 random(3);
+    std::uniform_real_distribution<float> at(-0.9f, 0.9f), size(0.05f, 0.2f);
+    std::vector<Edit> out{edit(Sphere{.radius = 0.6f}, {0.2f, 0, 0}),
+                          edit(Box{.half_extents = {0.01f, 0.7f, 0.7f}}, {-0.8f, 0, 0})};
+    for (int i = 0; i < 25; ++i)
+        out.push_back(edit(Sphere{.radius = size(random)}, {at(random), at(random), at(random)},
+                           i % 4 == 3 ? Op::Subtract : Op::Union, i % 3 == 0 ? 0.1f : 0.0f));
+    return out;
+}
+
+std::vector<sdf::Isa> isas() {
+    std::vector<sdf::Isa> out;
+    for (const sdf::Isa isa : {sdf::Isa::Scalar, sdf::Isa::Sse4, sdf::Isa::Avx2, sdf::Isa::Avx512})
+        if (sdf::has_isa(isa)) out.push_back(isa);
+    return out;
+}
+
+struct Cloud {
+    std::vector<float> x, y, z;
+    void add(float a, float b, float c) {
+        x.push_back(a);
+        y.push_back(b);
+        z.push_back(c);
+    }
+    sdf::Points points() const { return {x.data(), y.data(), z.data(), int(x.size())}; }
+};
+
+Cloud cloud() {
+    std::mt19937 random(1);
+    std::uniform_real_distribution<float> in(-1.4f, 1.4f);
+    Cloud out;
+    for (int i = 0; i < 20011; ++i) out.add(in(random), in(random), in(random));    // not a multiple of any width
+    for (int i = -40; i < 40; ++i) out.add(float(i) * 0.03f, float(i) * 0.21f, 0);  // on texels and on brick faces
+    const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
+    for (const float far : {inf, -inf, nan, 1e30f, -1e30f, 1e9f})
+        out.add(far, 0, 0), out.add(0, far, 0), out.add(0, 0, far);
+    return out;
+}
+
+class WideInEachFormat : public testing::TestWithParam<DistanceFormat> {};
+
+TEST_P(WideInEachFormat, DistancesAreThoseOfOnePointAtATimeOnEveryInstructionSet) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const Cloud c = cloud();
+    for (const sdf::Isa isa : isas()) {
+        std::vector<float> out(c.x.size(), -77);
+        bricks.distances(c.points(), out.data(), isa);
+        for (size_t i = 0; i < out.size(); ++i) {
+            const float one = bricks.distance({c.x[i], c.y[i], c.z[i]});
+            ASSERT_EQ(std::bit_cast<uint32_t>(out[i]), std::bit_cast<uint32_t>(one))
+                << "isa " << int(isa) << " at " << c.x[i] << " " << c.y[i] << " " << c.z[i];
+        }
+    }
+}
+
+TEST_P(WideInEachFormat, DistancesAreTheBricksWhereOneIsAndABoundElsewhere) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const Cloud c = cloud();
+    int in_bricks = 0, empty = 0, far = 0;
+    for (size_t i = 0; i < c.x.size(); ++i) {
+        if (!std::isfinite(c.x[i] + c.y[i] + c.z[i]) || std::abs(c.x[i] + c.y[i] + c.z[i]) > 100) continue;
+        const dvec3 p{double(c.x[i]), double(c.y[i]), double(c.z[i])};
+        const double d = double(bricks.distance({c.x[i], c.y[i], c.z[i]}));
+        const HostBricks::Sample sample = bricks.sample(p);
+        if (sample.from_brick) {
+            EXPECT_NEAR(d, sample.distance, 1e-5);
+            ++in_bricks;
+            continue;
+        }
+        // Nothing but the exact value is known there: a bound, on the right side.
+        EXPECT_LE(std::abs(d), std::abs(sample.distance) + 0.87 * 0.03);
+        EXPECT_TRUE(d == 0 || std::abs(sample.distance) <= 0.03 || (d < 0) == (sample.distance < 0)) << d;
+        ++empty;
+        far += std::abs(d) > 0.3;
+    }
+    EXPECT_GT(in_bricks, 1500);
+    EXPECT_GT(empty, 2000);
+    EXPECT_GT(far, 50);
+}
+
+std::vector<Ray> all_kinds_of_rays() {
+    std::mt19937 random(7);
+    std::normal_distribution<float> gauss;
+    std::uniform_real_distribution<float> in(-1.3f, 1.3f), far(0, 3);
+    std::vector<Ray> out;
+    for (int i = 0; i < 6003; ++i) {
+        Ray ray;
+        ray.direction = normalize(vec3{gauss(random), gauss(random), gauss(random)});
+        ray.origin = {in(random), in(random), in(random)};
+        if (i % 3 == 0) ray.origin = ray.direction * -4.0f + ray.origin * 0.5f;
+        if (i % 7 == 0) ray.t_max = far(random);
+        if (i % 11 == 0) ray.direction.x = 0, ray.direction = normalize(ray.direction);
+        if (i % 13 == 0) ray.direction = {0, i % 2 == 0 ? 1.0f : -1.0f, 0};
+        if (i % 17 == 0) ray.origin = {0.21f * float(i % 9 - 4), 0.03f * float(i % 5), 0.21f};  // on planes of texels
+        out.push_back(ray);
+    }
+    return out;
+}
+
+TEST_P(WideInEachFormat, RaysHaveTheBitsOfTheScalarMarchOnEveryInstructionSet) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    const float h = bricks.field().grid().voxel_size;
+    std::array<int, 3> states{};
+    std::vector<MarchHit> wide(rays.size());
+    for (const sdf::Isa isa : isas()) {
+        bricks.march(rays, wide.data(), isa);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            const Ray& r = rays[i];
+            const MarchHit one =
+                bricks.march(texel_ray_of({double(r.origin.x), double(r.origin.y), double(r.origin.z)}, r.direction, h),
+                             0, float(std::min(double(r.t_max) / double(h), double(kFarVoxels))));
+            ASSERT_EQ(wide[i].state, one.state) << "isa " << int(isa) << " ray " << i;
+            ASSERT_EQ(std::bit_cast<uint32_t>(wide[i].t), std::bit_cast<uint32_t>(one.t))
+                << "isa " << int(isa) << " ray " << i;
+            ASSERT_EQ(wide[i].cell, one.cell) << i;
+            if (one.state == kMarchHit) {
+                ASSERT_EQ(wide[i].slot, one.slot) << i;
+                ASSERT_EQ(wide[i].voxel, one.voxel) << i;
+                ASSERT_EQ(wide[i].p, one.p) << i;
+            }
+            ++states[size_t(one.state)];
+        }
+    }
+    for (const int count : states) EXPECT_GT(count, 100);
+}
+
+TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
+    std::vector<Edit> edits = mixed();
+    HostBricks bricks = bricks_of(GetParam(), edits);
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    std::vector<MarchHit> before(rays.size()), after(rays.size()), anew(rays.size());
+    bricks.march(rays, before.data());
+    const HostBricks old = bricks;
+    edits.push_back(edit(Sphere{.radius = 0.3f}, {0.5f, 0.1f, 0}, Op::Subtract));
+    sdf::Program program = bricks.field().program();
+    const RowChange change{kNoRow, *sdf::insert(program, edits.back(), {}, {}, sdf::order_at(edits.size()), 0)};
+    ASSERT_TRUE(bricks.update(std::make_shared<const sdf::Program>(program), std::span(&change, 1)));
+    bricks.march(rays, after.data());
+    bricks_of(GetParam(), edits).march(rays, anew.data());
+    int changed = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        EXPECT_EQ(after[i].state, anew[i].state);
+        EXPECT_EQ(after[i].t, anew[i].t);
+        changed += after[i].t != before[i].t;
+    }
+    EXPECT_GT(changed, 50);
+    old.march(rays, after.data());  // the copy still is what it was
+    for (size_t i = 0; i < rays.size(); ++i) EXPECT_EQ(after[i].t, before[i].t);
+}
+
+TEST(Wide, ASolidMaskNamesTheVoxelsWithASolidCorner) {
+    std::mt19937 random(5);
+    for (const int texel_bytes : {1, 2}) {
+        std::vector<std::byte> texels(size_t(kBrickTexelCount * texel_bytes));
+        std::vector<float> values(kBrickTexelCount);
+        for (size_t i = 0; i < values.size(); ++i) {
+            const float d = random() % 30 == 0 ? -1.0f : random() % 90 == 0 ? 0.0f : 2.0f;
+            const uint32_t code = texel_bytes == 2 ? half_code(d) : snorm8_code(d);
+            std::memcpy(texels.data() + i * size_t(texel_bytes), &code, size_t(texel_bytes));
+            values[i] = d;
+        }
+        std::byte mask[kSolidMaskBytes];
+        solid_mask(texels.data(), texel_bytes, mask);
+        for (int v = 0; v < 343; ++v) {
+            const int x = v % 7, y = v / 7 % 7, z = v / 49;
+            bool solid = false;
+            for (int c = 0; c < 8; ++c)
+                solid = solid || values[size_t(((z + (c >> 2)) * 8 + y + (c >> 1 & 1)) * 8 + x + (c & 1))] <= 0;
+            EXPECT_EQ((int(mask[z * 8 + y]) >> x & 1) != 0, solid) << x << " " << y << " " << z;
+        }
+    }
+}
+
+TEST(Wide, NoBricksAtAllAreNoTrouble) {
+    const HostBricks bricks = bricks_of(DistanceFormat::Half, {});
+    const Cloud c = cloud();
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    for (const sdf::Isa isa : isas()) {
+        std::vector<float> out(c.x.size());
+        bricks.distances(c.points(), out.data(), isa);
+        for (const float d : out) EXPECT_GE(d, 0);
+        std::vector<MarchHit> hits(rays.size());
+        bricks.march(rays, hits.data(), isa);
+        for (const MarchHit& hit : hits) EXPECT_EQ(hit.state, kMarchMiss);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, WideInEachFormat, testing::Values(DistanceFormat::Half, DistanceFormat::Snorm8));
+
+}  // namespace
+}  // namespace kiln::field

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: MIT
+// Benchmarks do the work they say: the scenes are those of the recipe, and every row's result is the slow way's.
+#include "measure/bench_run.h"
+#include "measure/recipes.h"
+#include "measure/slow.h"
+
+#include "sdf/eval.h"
+#include "sdf/program.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace kiln::measure {
+namespace {
+
+using testing::HasSubstr;
+
+double distance_at(const std::vector<Edit>& edits, dvec3 p) {
+    return sdf::evaluate(sdf::view(*sdf::compile({edits, {}, {}})), p);
+}
+
+TEST(Recipes, AreThePublishedScenes) {
+    EXPECT_NEAR(double(uniform(5, 0, 0)), 0.31134617, 1e-8);
+    const std::vector<Edit> pebbles = recipe(0, 5, 1000);
+    const vec3 c = pebbles[0].node.transform.position;
+    EXPECT_NEAR(double(c.x), -0.339577, 1e-6);
+    EXPECT_NEAR(double(c.y), -0.136894, 1e-6);
+    EXPECT_NEAR(double(c.z), -0.454261, 1e-6);
+    int spheres = 0, cuts = 0;
+    for (const Edit& e : pebbles) spheres += e.node.shape.kind == uint16_t(ShapeKind::Sphere);
+    EXPECT_EQ(spheres, 512);
+    EXPECT_NEAR(distance_at(pebbles, {0, 0, 0}), -0.018778, 1e-6);
+    EXPECT_NEAR(distance_at(pebbles, {0.3, -0.2, 0.5}), 0.024931, 1e-6);
+    for (const Edit& e : recipe(1, 5, 1000)) cuts += e.op == Op::Subtract;
+    EXPECT_EQ(cuts, 300);
+    EXPECT_NEAR(distance_at(recipe(2, 5, 1000), {0, 0, 0}), -0.006656, 1e-6);
+    EXPECT_NEAR(distance_at(recipe(2, 5, 1000), {0.3, -0.2, 0.5}), -0.007597, 1e-6);
+    EXPECT_NEAR(distance_at(recipe(0, 5, 100), {0, 0, 0}), 0.133487, 1e-6);
+}
+
+BenchOptions small(std::vector<int> kinds) {
+    BenchOptions o;
+    o.kinds = std::move(kinds);
+    o.seed = 11;
+    o.count = 60;
+    o.resolution = 48;
+    o.runs = 1;
+    o.threads = 1;
+    return o;
+}
+
+TEST(Bench, EveryRowOfEveryKindEqualsTheSlowWay) {
+    const std::vector<std::string> field{"field"};
+    const auto report = run_bench(field, small({0, 1, 2}));
+    ASSERT_TRUE(report) << report.error().message;
+    size_t rows = 0;
+    for (const BenchInfo& info : bench_list())
+        if (info.name == "field") rows = info.rows.size();
+    EXPECT_EQ(report->rows.size(), 3 * rows);
+    for (const BenchRow& row : report->rows) {
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_EQ(row.checksum.size(), 16u) << row.name;
+        EXPECT_EQ(row.threads, 1) << row.name;
+        EXPECT_FALSE(row.unit.empty()) << row.name;
+        EXPECT_EQ(std::isfinite(row.ratio), !row.peer.empty()) << row.name;
+    }
+}
+
+TEST(Bench, AChecksumFollowsTheSceneAndNothingElse) {
+    const std::vector<std::string> bake{"field/bake"};
+    const auto checksum = [&](const BenchOptions& o) { return run_bench(bake, o)->rows.at(0).checksum; };
+    const BenchOptions one = small({0});
+    BenchOptions other = one, threads = one;
+    other.seed = 12;
+    threads.threads = 2;
+    EXPECT_EQ(checksum(one), checksum(one));
+    EXPECT_EQ(checksum(one), checksum(threads));
+    EXPECT_NE(checksum(one), checksum(other));
+}
+
+TEST(Bench, AResultThatIsNotTheSlowWaysEndsTheRun) {
+    BenchRun run(BenchOptions{}, {}, {}, 1);
+    BenchRow row;
+    row.name = "bake";
+    run.add_checked(row, 1, 1);
+    EXPECT_FALSE(run.fault());
+    run.add_checked(row, 1, 2);
+    ASSERT_TRUE(run.fault());
+    EXPECT_THAT(run.fault()->message, HasSubstr("bake"));
+}
+
+TEST(Bench, TheSlowWaySeesOneTexelThatDiffers) {
+    const std::vector<Edit> edits = recipe(0, 5, 30);
+    std::vector<Edit> moved = edits;
+    moved[7].node.transform.position.x += 1e-4f;
+    field::FieldOptions options;
+    options.voxel_size = 2.0f / 48;
+    options.bounds = {{-1, -1, -1}, {1, 1, 1}};
+    const auto program = std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}}));
+    const field::HostBricks bricks = field::HostBricks::bake(*field::Field::build(program, options));
+    for (const uint64_t stride : {1u, 7u}) {
+        const Stored slow = brute_force(*program, bricks.field(), stride);
+        EXPECT_EQ(stored(bricks, stride).checksum, slow.checksum);
+        EXPECT_GT(slow.band_voxels, slow.bricks);
+    }
+    EXPECT_NE(brute_force(*sdf::compile({moved, {}, {}}), bricks.field()).checksum, stored(bricks).checksum);
+}
+
+TEST(Bench, WrongWordsAreToldWithTheMend) {
+    const std::vector<std::string> unknown{"feild"};
+    const auto report = run_bench(unknown, small({0}));
+    ASSERT_FALSE(report);
+    EXPECT_EQ(report.error().kind, ErrorKind::Usage);
+    EXPECT_THAT(report.error().message, HasSubstr("--list"));
+    EXPECT_FALSE(run_bench({}, small({3})));
+    BenchOptions none = small({0});
+    none.count = 0;
+    EXPECT_FALSE(run_bench({}, none));
+}
+
+}  // namespace
+}  // namespace kiln::measure
