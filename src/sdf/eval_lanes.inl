@@ -43,9 +43,9 @@ static inline real box_distance(real3 p, param3 lo, param3 hi) {
 
 // One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
 static __attribute__((noinline)) void step(Registers& r, uint32_t word, const float* w, Samples samples) {
-    const uint32_t aux = (word >> 4) & 255u;
-    Chunk& dst = r.value[(word >> 12) & 31u];
-    switch (Opcode(word & 15u)) {
+    const uint32_t aux = (word >> 5) & 255u;
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    switch (Opcode(word & 31u)) {
         case Opcode::PointCell:
             for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, point_at(r.cell, i));
             break;
@@ -91,11 +91,11 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
         const float* w = params + code[2 * pc + 1];
-        Chunk& dst = r.value[(word >> 12) & 31u];
-        const Chunk& a = r.value[(word >> 17) & 31u];
-        const Chunk& b = r.value[(word >> 22) & 31u];
-        const uint32_t aux = (word >> 4) & 255u;
-        switch (Opcode(word & 15u)) {
+        Chunk& dst = r.value[(word >> 13) & 31u];
+        const Chunk& a = r.value[(word >> 18) & 31u];
+        const Chunk& b = r.value[(word >> 23) & 31u];
+        const uint32_t aux = (word >> 5) & 255u;
+        switch (Opcode(word & 31u)) {
             case Opcode::Combine: {
                 const param k = param(w[0]);
                 switch (aux & 3u) {
@@ -142,14 +142,14 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
         const float* w = params + code[2 * pc + 1];
-        const uint32_t d = (word >> 12) & 31u;
+        const uint32_t d = (word >> 13) & 31u;
         Chunk& dst = r.value[d];
-        const Chunk& a = r.value[(word >> 17) & 31u];
-        const Chunk& b = r.value[(word >> 22) & 31u];
-        const MixChunk& mix_a = mix[(word >> 17) & 31u];
-        const MixChunk& mix_b = mix[(word >> 22) & 31u];
-        const uint32_t aux = (word >> 4) & 255u;
-        switch (Opcode(word & 15u)) {
+        const Chunk& a = r.value[(word >> 18) & 31u];
+        const Chunk& b = r.value[(word >> 23) & 31u];
+        const MixChunk& mix_a = mix[(word >> 18) & 31u];
+        const MixChunk& mix_b = mix[(word >> 23) & 31u];
+        const uint32_t aux = (word >> 5) & 255u;
+        switch (Opcode(word & 31u)) {
             case Opcode::Combine:
                 for (int i = 0; i < KILN_VECTORS; ++i) {
                     const uint32_t op = aux & 3u;

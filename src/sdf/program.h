@@ -34,7 +34,7 @@ inline constexpr uint32_t kDefaultMaterial = 0;
 inline constexpr uint16_t kSeveralMaterials = 65534;  ///< of an edit: its leaves are of more than one
 inline constexpr uint32_t material_number(MaterialId id) { return id ? id.index + 1 : kDefaultMaterial; }
 
-// Instruction word: opcode 0-3, aux 4-11, dst 12-16, a 17-21, b 22-26. `param` indexes Program::params.
+// Instruction word: opcode 0-4, aux 5-12, dst 13-17, a 18-22, b 23-27. `param` indexes Program::params.
 enum class Opcode : uint32_t {
     PointCell,       // P = C                                                 (starts a chain)
     PointTranslate,  // P = C − t               t[3]                           (starts a chain)
@@ -62,13 +62,13 @@ struct Instruction {
     uint32_t param;
 
     static constexpr Instruction make(Opcode op, uint32_t aux, uint32_t dst, uint32_t a, uint32_t b, uint32_t param) {
-        return {uint32_t(op) | aux << 4 | dst << 12 | a << 17 | b << 22, param};
+        return {uint32_t(op) | aux << 5 | dst << 13 | a << 18 | b << 23, param};
     }
-    constexpr Opcode opcode() const { return Opcode(word & 15u); }
-    constexpr uint32_t aux() const { return (word >> 4) & 255u; }
-    constexpr uint32_t dst() const { return (word >> 12) & 31u; }
-    constexpr uint32_t a() const { return (word >> 17) & 31u; }
-    constexpr uint32_t b() const { return (word >> 22) & 31u; }
+    constexpr Opcode opcode() const { return Opcode(word & 31u); }
+    constexpr uint32_t aux() const { return (word >> 5) & 255u; }
+    constexpr uint32_t dst() const { return (word >> 13) & 31u; }
+    constexpr uint32_t a() const { return (word >> 18) & 31u; }
+    constexpr uint32_t b() const { return (word >> 23) & 31u; }
     constexpr bool starts_chain() const { return opcode() <= Opcode::PointAffine; }
     constexpr bool moves_point() const { return opcode() <= Opcode::PointClamp; }
     friend bool operator==(const Instruction&, const Instruction&) = default;

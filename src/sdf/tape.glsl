@@ -89,17 +89,17 @@ float tape_distance(uint first, uint count, vec3 p_world) {
         uvec2 instruction = sdf_code(pc);
         uint word = instruction.x;
         uint at = instruction.y;
-        uint aux = (word >> 4u) & 255u;
-        uint dst = (word >> 12u) & 31u;
-        uint a = (word >> 17u) & 31u;
-        uint b = (word >> 22u) & 31u;
-        switch (word & 15u) {
+        uint aux = (word >> 5u) & 255u;
+        uint dst = (word >> 13u) & 31u;
+        uint a = (word >> 18u) & 31u;
+        uint b = (word >> 23u) & 31u;
+        switch (word & 31u) {
             case kOpPointCell: p = p_world; break;
             case kOpPointTranslate: p = p_world - tape_vec3(at); break;
             case kOpPointAffine:
             case kOpPointAffineOn:
                 if (KILN_USES_OPCODE(kOpPointAffine) || KILN_USES_OPCODE(kOpPointAffineOn)) {
-                    p = tape_affine((word & 15u) == kOpPointAffine ? p_world : p, at);
+                    p = tape_affine((word & 31u) == kOpPointAffine ? p_world : p, at);
                 }
                 break;
             case kOpPointWarp:
@@ -140,7 +140,7 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             }
             case kOpMove:
             case kOpNegate:
-                value[dst] = (word & 15u) == kOpNegate ? -value[a] : value[a];
+                value[dst] = (word & 31u) == kOpNegate ? -value[a] : value[a];
 #ifdef KILN_TAPE_MATERIALS
                 mixes[dst] = mixes[a];
 #endif
