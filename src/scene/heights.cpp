@@ -2,17 +2,37 @@
 
 #include "scene/heights.h"
 
+#include "sdf/expression_code.h"
 #include "sdf/tables.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
 
 namespace kiln::scene {
 
 namespace {
 
 bool has_file(const Node& node) {
-    return node.kind == Node::Kind::Shape && node.shape.kind < sdf::shape_rows().size() &&
-           sdf::shape_rows()[node.shape.kind].how == sdf::KindRow::Sampled;
+    if (node.kind != Node::Kind::Shape || node.shape.kind >= sdf::shape_rows().size()) return false;
+    const sdf::KindRow::How how = sdf::shape_rows()[node.shape.kind].how;
+    return how == sdf::KindRow::Sampled ||
+           (how == sdf::KindRow::Formula && node.shape.data.starts_with(sdf::kModelFile));
+}
+
+Result<std::string> read_model(const std::string& path) {
+    constexpr std::uintmax_t kMostBytes = std::uintmax_t(16) << 20;
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+    std::ifstream in(path, std::ios::binary);
+    if (error || !in) return Error{path + ": cannot be read; check the name", ErrorKind::Input};
+    if (bytes > kMostBytes) return Error{path + ": longer than 16 MiB; use a smaller model", ErrorKind::Input};
+    std::string text(size_t(bytes), '\0');
+    in.read(text.data(), std::streamsize(text.size()));
+    if (!in) return Error{path + ": cannot be read to its end", ErrorKind::Input};
+    return text;
 }
 
 }  // namespace
@@ -31,6 +51,20 @@ Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Obj
     out.own_objects = objects;
     const auto number = [&](Node& node, sdf::Fault where) -> Result<void> {
         if (!has_file(node)) return {};
+        if (node.shape.data.starts_with(sdf::kModelFile)) {
+            const std::string name = node.shape.data.substr(sdf::kModelFile.size());
+            auto model = grids.models.find(name);
+            if (model == grids.models.end()) {
+                auto text = read_model(name.starts_with('/') ? name : folder + name);
+                if (!text) {
+                    if (fault) *fault = where;
+                    return text.error();
+                }
+                model = grids.models.emplace(name, std::move(*text)).first;
+            }
+            node.shape.data = std::string(sdf::kModelText) + model->second;
+            return {};
+        }
         auto found = grids.by_file.find(node.shape.data);
         if (found == grids.by_file.end()) {
             const bool absolute = node.shape.data.starts_with('/');

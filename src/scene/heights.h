@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Height images of sampled shapes: loaded once each, and named by number in what the compiler reads.
+// Files of shapes, loaded once each: height images, named by number in what the compiler reads, and models, whose text takes the
+// name's place.
 #pragma once
 
 #include "sdf/program.h"
@@ -14,6 +15,7 @@ namespace kiln::scene {
 struct Grids {
     std::vector<sdf::HeightGrid> grids;
     std::map<std::string, uint32_t> by_file;
+    std::map<std::string, std::string> models;  ///< text by file name
 };
 
 /// The grey values (of colours: red) of a PNG image, 0 for black and 1 for white, as they stand (no gamma).

@@ -16,6 +16,7 @@ namespace kiln::sdf::avx512 {
 #define KILN_T real
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
 #include "sdf/lang/material.sdf.h"
 
 #include "sdf/texts.gen.inl"

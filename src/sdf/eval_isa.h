@@ -13,14 +13,14 @@
 #define KILN_DECLARE_ISA(name)                                                                                         \
     namespace kiln::sdf::name {                                                                                        \
     void evaluate_points(const uint32_t* code, size_t count, const float* params, const float* samples,                \
-                         const float* x, const float* y, const float* z, int points, float* out);                      \
+                         const float* x, const float* y, const float* z, int points, float* out, void* memory);        \
     void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, \
                         const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,  \
-                        int slot);                                                                                     \
+                        int slot, void* memory);                                                                       \
     void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples,                  \
-                   const Balls& balls, uint64_t* left, uint64_t* right, float* value);                                 \
+                   const Balls& balls, uint64_t* left, uint64_t* right, float* value, void* memory);                   \
     float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples,                \
-                         const float* x, const float* y, const float* z, float* out);                                  \
+                         const float* x, const float* y, const float* z, float* out, void* memory);                    \
     void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes);      \
     }
 KILN_DECLARE_ISA(scalar)

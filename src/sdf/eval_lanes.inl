@@ -4,9 +4,7 @@
 // Uses no standard-library templates: what a wide instruction set compiles here must not be shared with other files.
 // KILN_VECTORS: vectors in a chunk. load(), store() and real are the including file's.
 
-struct Chunk {
-    real v[KILN_VECTORS];
-};
+#include "sdf/expression.inl"
 
 struct MixChunk {
     Mix v[KILN_VECTORS];
@@ -16,6 +14,7 @@ struct Registers {
     Chunk cell[3];             // C
     Chunk point[3];            // P
     Chunk value[kRegisters];
+    Chunk* memory;             // of formulas with more values than registers; null where the tape has none
 };
 
 static inline real3 point_at(const Chunk* p, int i) { return real3(p[0].v[i], p[1].v[i], p[2].v[i]); }
@@ -40,6 +39,33 @@ static inline real box_distance(real3 p, param3 lo, param3 hi) {
     const real3 q = max(real3(lo) - p, p - real3(hi));
     return length(max(q, real3(zero, zero, zero))) + min(max(q.x, max(q.y, q.z)), zero);
 }
+
+// One step of a formula. An operand may be the instruction's own number.
+static void formula_step(Registers& r, uint32_t word, const float* w) {
+    const uint32_t aux = (word >> 5) & 255u;
+    const Fn fn = Fn(aux & kFnBits);
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    const Chunk* a = &r.value[(word >> 18) & 31u];
+    const Chunk* b = &r.value[(word >> 23) & 31u];
+    switch (fn) {
+        case Fn::X: dst = r.point[0]; return;
+        case Fn::Y: dst = r.point[1]; return;
+        case Fn::Z: dst = r.point[2]; return;
+        case Fn::Constant: chunk_of(dst, real(param(w[0]))); return;
+        case Fn::Store: r.memory[uint32_t(w[0])] = *a; return;
+        case Fn::Load: dst = r.memory[uint32_t(w[0])]; return;
+        default: break;
+    }
+    Chunk number;
+    if ((aux & (kNumberA | kNumberB)) != 0) {
+        chunk_of(number, real(param(w[0])));
+        ((aux & kNumberA) != 0 ? a : b) = &number;
+    }
+    arithmetic(dst, *a, *b, fn);
+}
+
+// The distance a formula or a user's shape stands for: nothing where it is no number.
+static inline real cleaned(real v) { return select(lt(abs(v), real(param(kEmpty))), v, real(param(kEmpty))); }
 
 // One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
 static __attribute__((noinline)) void step(Registers& r, uint32_t word, const float* w, Samples samples) {
@@ -83,6 +109,12 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
                 dst.v[i] = max(min(dst.v[i], real(param(w[1]))), box);
             }
             break;
+        case Opcode::Arithmetic: formula_step(r, word, w); break;
+        case Opcode::Result: {
+            const Chunk& from = r.value[(word >> 18) & 31u];
+            for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = cleaned(from.v[i]) * param(w[0]);
+            break;
+        }
         default: __builtin_unreachable();
     }
 }
@@ -190,6 +222,7 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
                 }
                 break;
             case Opcode::Shape:
+            case Opcode::Result:
                 step(r, word, w, samples);
                 for (int i = 0; i < KILN_VECTORS; ++i) mix[d].v[i] = make_mix(real(param(w[slot])), none, zero);
                 break;

@@ -12,6 +12,7 @@
 
 #include "base/append_array.h"
 #include "sdf/edit_index.h"
+#include "sdf/expression_fn.h"
 
 #include <kiln/edit.h>
 #include <kiln/result.h>
@@ -54,8 +55,18 @@ enum class Opcode : uint32_t {
     // Only in pruned code, where R[b] won a Combine by distance but what R[a] was made of still shows through:
     Take,      // R[dst] = R[b] (aux 0) or −R[b] (aux 1); material: R[b]'s, or R[a]'s where R[b] has none
     Constant,  // R[dst] = 0 with the material (edit) of the Shape at param: only its material is looked at
+    // Formulas (expression.h): registers hold numbers here, not distances, until Result.
+    Arithmetic,  // R[dst] = Fn(aux & kFnBits)(R[a], R[b])   kNumberA, kNumberB: that operand is the one number; Store, Load: slot
+    Result,  // R[dst] = s · R[a], kEmpty for NaN        s, material, edit
 };
 inline constexpr uint32_t kMayLackMaterial = 4;
+inline constexpr uint32_t kFnBits = 63, kNumberA = 64, kNumberB = 128;
+
+/// Does an Arithmetic instruction of this aux read the number at its param?
+inline constexpr bool reads_number(uint32_t aux) {
+    const Fn fn = Fn(aux & kFnBits);
+    return (aux & (kNumberA | kNumberB)) != 0 || fn == Fn::Constant || fn == Fn::Store || fn == Fn::Load;
+}
 
 struct Instruction {
     uint32_t word;
@@ -112,6 +123,7 @@ public:
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
     bool unbounded = false;  ///< some visible union edit has infinite bounds
+    uint32_t memory_slots = 0;  ///< values that formulas keep outside the registers at once; the GPU has none
 
     /// Rows of the visible edits, in order.
     std::vector<uint32_t> rows() const;

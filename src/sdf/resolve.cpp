@@ -280,6 +280,16 @@ private:
         return {};
     }
 
+    Result<void> prepare(const Shape& shape) {
+        auto& slot = out_.formulas[std::pair(shape.data, shape.params)];
+        if (slot) return {};
+        const float* p = shape.params.data();  // lipschitz, half_extents
+        auto made = prepare_formula(shape.data, {p[1], p[2], p[3]}, p[0]);
+        if (!made) return fail(fault_, where_, made.error().message);
+        slot = *made;
+        return {};
+    }
+
     // Shape::data is the index of a grid with at least 2 x 2 values.
     bool has_grid(const Shape& shape) const {
         size_t index = 0;
@@ -308,6 +318,9 @@ private:
         } else {
             if (shape_rows()[node.shape.kind].how == KindRow::Sampled && !has_grid(node.shape)) {
                 return fail(fault_, where_, "refers to a file that was not loaded");
+            }
+            if (shape_rows()[node.shape.kind].how == KindRow::Formula) {
+                if (auto r = prepare(node.shape); !r) return r;
             }
             box = shape_bounds(node.shape);
         }
@@ -379,6 +392,10 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
         if (field.name == "step_z") params[at] = grids[index].steps.y;
     }
     return params;
+}
+
+const PreparedFormula& Resolved::formula_of(const Shape& shape) const {
+    return *formulas.at(std::pair(shape.data, shape.params));
 }
 
 EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {

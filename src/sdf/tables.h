@@ -28,7 +28,8 @@ struct KindRow {
         Exact,
         Bound,
         Sampled,
-        Composite,  // shapes: true distance outside; lower bound; also reads samples; a library object
+        Formula,
+        Composite,  // shapes: true distance outside; lower bound; also reads samples; Shape::data compiled; a library object
         Point,
         Value,
         Copies,  // warps: moves the point; changes the distance; several copies

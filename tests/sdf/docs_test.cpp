@@ -16,9 +16,9 @@ namespace {
 void number(std::ostream& out, float v) { out << v; }
 
 void section(std::ostream& out, const KindRow& row, const char* key) {
-    static constexpr const char* kHow[] = {"exact outside",  "lower bound",     "lower bound, reads a file",
-                                           "tree of shapes", "moves the point", "changes the distance",
-                                           "several copies"};
+    static constexpr const char* kHow[] = {
+        "exact outside",  "lower bound",     "lower bound, reads a file", "a formula",
+        "tree of shapes", "moves the point", "changes the distance",      "several copies"};
     out << "\n### `" << row.name << "`\n\n" << row.doc << " *(" << kHow[row.how] << ")*\n\n";
     bool any = false;
     for (const FieldRow& field : row.fields()) {
