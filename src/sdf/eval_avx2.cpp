@@ -33,4 +33,5 @@ static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof 
 
 static inline uint32_t lane_bits(mask m) { return uint32_t(_mm256_movemask_ps(__m256(m.v))); }
 #include "sdf/eval_list.inl"
+#include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::avx2

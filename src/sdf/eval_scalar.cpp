@@ -24,4 +24,5 @@ static inline void store(float* to, real v) { *to = v; }
 
 static inline uint32_t lane_bits(mask m) { return m ? 1u : 0u; }
 #include "sdf/eval_list.inl"
+#include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::scalar

@@ -129,12 +129,14 @@ private:
         if (place >= text_.size()) return "the end";
         size_t n = 1;
         if (is_letter(text_[place]))
-            while (place + n < text_.size() && (is_letter(text_[place + n]) || is_digit(text_[place + n])) && n < 40) ++n;
+            while (place + n < text_.size() && (is_letter(text_[place + n]) || is_digit(text_[place + n])) && n < 40)
+                ++n;
         while (place + n < text_.size() && (uint8_t(text_[place + n]) & 0xc0) == 0x80) ++n;  // a whole UTF-8 letter
         return "\"" + std::string(text_.substr(place, n)) + "\"";
     }
     void skip() {
-        while (at_ < text_.size() && (text_[at_] == ' ' || text_[at_] == '\t' || text_[at_] == '\n' || text_[at_] == '\r'))
+        while (at_ < text_.size() &&
+               (text_[at_] == ' ' || text_[at_] == '\t' || text_[at_] == '\n' || text_[at_] == '\r'))
             ++at_;
     }
     std::string_view word() {
@@ -163,20 +165,23 @@ private:
             if (name.empty()) {
                 if (at_ < text_.size()) return fail(at_, "a value stands alone before \";\"; give it a name: a = …;");
                 if (value.size != 1)
-                    return fail(from, formatted("the value is a vector of {}; a distance is one number, such as length(p) - 1",
-                                                value.size));
+                    return fail(
+                        from, formatted("the value is a vector of {}; a distance is one number, such as length(p) - 1",
+                                        value.size));
                 result_ = value.at[0];
                 return true;
             }
             if (at_ == text_.size())
-                return fail(at_, formatted("nothing follows \"{} = …\"; end it with \";\" and write the distance", name));
+                return fail(at_,
+                            formatted("nothing follows \"{} = …\"; end it with \";\" and write the distance", name));
             ++at_;  // the semicolon
             if (known(name)) return fail(from, formatted("\"{}\" has a meaning already; choose another name", name));
             names_.emplace(name, value);
         }
     }
     bool known(std::string_view name) const {
-        if (name == "x" || name == "y" || name == "z" || name == "p" || name == "pi" || names_.contains(name)) return true;
+        if (name == "x" || name == "y" || name == "z" || name == "p" || name == "pi" || names_.contains(name))
+            return true;
         for (const Function& f : kFunctions)
             if (f.name == name) return true;
         return false;
@@ -193,7 +198,8 @@ private:
             const char c = at_ < text_.size() ? text_[at_] : '\0';
             const bool ends = at_ == text_.size() || c == ';';
             if (wants_value) {
-                if (ends) return fail(place, formatted("a value is missing before {}; write one, such as x", seen(place)));
+                if (ends)
+                    return fail(place, formatted("a value is missing before {}; write one, such as x", seen(place)));
                 if (is_digit(c) || (c == '.' && at_ + 1 < text_.size() && is_digit(text_[at_ + 1]))) {
                     if (!number()) return false;
                     wants_value = false;
@@ -246,7 +252,9 @@ private:
         }
     }
 
-    static int level(char symbol) { return symbol == '+' || symbol == '-' ? 1 : symbol == '*' || symbol == '/' ? 2 : 4; }
+    static int level(char symbol) {
+        return symbol == '+' || symbol == '-' ? 1 : symbol == '*' || symbol == '/' ? 2 : 4;
+    }
 
     // Applies what waits and binds at least as tightly as `least`, up to the innermost bracket.
     bool reduce(int least) {
@@ -271,7 +279,8 @@ private:
     bool fits(size_t place) {
         if (build_.full())
             return fail(place, formatted("more than {} operations; use a smaller expression", kMaxFormulaNodes));
-        if (build_.not_finite()) return fail(place, "this comes to no finite number (a division by 0?); change its constants");
+        if (build_.not_finite())
+            return fail(place, "this comes to no finite number (a division by 0?); change its constants");
         return true;
     }
 
@@ -394,8 +403,9 @@ private:
             const char c = letters[i];
             if (c < 'x' || c > 'z') return fail(place, formatted(".{} is no component; use .x, .y or .z", letters));
             if (c - 'x' >= v.size || v.size == 1)
-                return fail(place, v.size == 1 ? formatted(".{} of a number; take it out", letters)
-                                               : formatted(".{} of a vector of {}; it has no such component", letters, v.size));
+                return fail(place, v.size == 1
+                                       ? formatted(".{} of a number; take it out", letters)
+                                       : formatted(".{} of a vector of {}; it has no such component", letters, v.size));
             out.at[i] = v.at[size_t(c - 'x')];
         }
         v = out;
@@ -408,14 +418,17 @@ private:
             sum = build_.binary(Fn::Add, sum, build_.binary(Fn::Mul, a.at[i], b.at[i]));
         return sum;
     }
-    uint32_t length(const Value& v) { return v.size == 1 ? build_.unary(Fn::Abs, v.at[0]) : build_.unary(Fn::Sqrt, dot(v, v)); }
+    uint32_t length(const Value& v) {
+        return v.size == 1 ? build_.unary(Fn::Abs, v.at[0]) : build_.unary(Fn::Sqrt, dot(v, v));
+    }
 
     bool call(const Pending& open) {
         const Function& f = *open.function;
         const size_t place = open.place;
         const size_t count = values_.size() - open.first_value;
         if (int(count) < f.least || int(count) > f.most)
-            return fail(place, formatted("{} has {} operand{} here; it takes {}", f.name, count, count == 1 ? "" : "s", taken(f)));
+            return fail(place, formatted("{} has {} operand{} here; it takes {}", f.name, count, count == 1 ? "" : "s",
+                                         taken(f)));
         std::vector<Value> in(values_.begin() + long(open.first_value), values_.end());
         values_.resize(open.first_value);
         const bool each = f.call <= Call::SmoothMax;
@@ -497,7 +510,8 @@ private:
         case Call::Vec3:
             out.size = int(count);
             for (size_t i = 0; i < count; ++i) {
-                if (in[i].size != 1) return fail(in[i].place, formatted("{} is made of numbers; take one component of this", f.name));
+                if (in[i].size != 1)
+                    return fail(in[i].place, formatted("{} is made of numbers; take one component of this", f.name));
                 out.at[i] = in[i].at[0];
             }
             break;
@@ -510,14 +524,17 @@ private:
             if (f.call == Call::Dot) {
                 out = {1, {dot(in[0], in[1])}, place};
             } else {
-                for (size_t i = 0; i < size_t(in[0].size); ++i) in[0].at[i] = b.binary(Fn::Sub, in[0].at[i], in[1].at[i]);
+                for (size_t i = 0; i < size_t(in[0].size); ++i)
+                    in[0].at[i] = b.binary(Fn::Sub, in[0].at[i], in[1].at[i]);
                 out = {1, {length(in[0])}, place};
             }
             break;
         case Call::Cross: {
-            if (in[0].size != 3 || in[1].size != 3) return fail(place, "cross takes two vectors of 3; write them as vec3(…)");
+            if (in[0].size != 3 || in[1].size != 3)
+                return fail(place, "cross takes two vectors of 3; write them as vec3(…)");
             const auto minor = [&](size_t i, size_t j) {
-                return b.binary(Fn::Sub, b.binary(Fn::Mul, in[0].at[i], in[1].at[j]), b.binary(Fn::Mul, in[0].at[j], in[1].at[i]));
+                return b.binary(Fn::Sub, b.binary(Fn::Mul, in[0].at[i], in[1].at[j]),
+                                b.binary(Fn::Mul, in[0].at[j], in[1].at[i]));
             };
             out = {3, {minor(1, 2), minor(2, 0), minor(0, 1)}, place};
             break;

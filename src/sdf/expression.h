@@ -47,9 +47,9 @@ double evaluate(const Formula& formula, dvec3 p);
 
 /// Values and slopes of a formula over a box, by interval arithmetic (Moore, "Interval Analysis", 1966) in double precision.
 struct FormulaRange {
-    double low = 0, high = 0;            ///< every value lies between
+    double low = 0, high = 0;                ///< every value lies between
     double slope_low[3]{}, slope_high[3]{};  ///< every partial derivative lies between; infinite where nothing is known
-    double steepest = 0;                 ///< no two points of the box differ by more than this per metre
+    double steepest = 0;                     ///< no two points of the box differ by more than this per metre
 };
 FormulaRange range_over(const Formula& formula, const Box3& box);
 

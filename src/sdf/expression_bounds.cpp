@@ -187,7 +187,8 @@ private:
         case Fn::Cos:
             return scaled(a, -sine(a.value), cosine(a.value));
         case Fn::Exp: {
-            const Interval value{std::exp(std::clamp(a.value.lo, -87.0, 88.0)), std::exp(std::clamp(a.value.hi, -87.0, 88.0))};
+            const Interval value{std::exp(std::clamp(a.value.lo, -87.0, 88.0)),
+                                 std::exp(std::clamp(a.value.hi, -87.0, 88.0))};
             return scaled(a, a.value.finite() ? value : kAll, value);
         }
         case Fn::Log: {
@@ -228,7 +229,8 @@ private:
         case Fn::Atan2: {
             const double nearest = std::sqrt(squared(a.value).lo + squared(b.value).lo);
             const bool cut = b.value.lo <= 0 && a.value.lo <= 0 && a.value.hi >= 0;  // the angle jumps there
-            if (cut && a.length + b.length > 0) return {{-std::numbers::pi, std::numbers::pi}, {kAll, kAll, kAll}, kInf};
+            if (cut && a.length + b.length > 0)
+                return {{-std::numbers::pi, std::numbers::pi}, {kAll, kAll, kAll}, kInf};
             const double corners[4] = {std::atan2(a.value.lo, b.value.lo), std::atan2(a.value.lo, b.value.hi),
                                        std::atan2(a.value.hi, b.value.lo), std::atan2(a.value.hi, b.value.hi)};
             out.value = {*std::min_element(corners, corners + 4), *std::max_element(corners, corners + 4)};
@@ -286,12 +288,16 @@ struct Cell {
     friend bool operator<(const Cell& a, const Cell& b) { return a.bound < b.bound; }
 };
 
-std::string point_text(const std::array<double, 3>& p) { return formatted("({:.4g}, {:.4g}, {:.4g})", p[0], p[1], p[2]); }
+std::string point_text(const std::array<double, 3>& p) {
+    return formatted("({:.4g}, {:.4g}, {:.4g})", p[0], p[1], p[2]);
+}
 
 }  // namespace
 
 FormulaRange range_over(const Formula& formula, const Box3& box) {
-    const Interval sides[3] = {{double(box.min.x), double(box.max.x)}, {double(box.min.y), double(box.max.y)}, {double(box.min.z), double(box.max.z)}};
+    const Interval sides[3] = {{double(box.min.x), double(box.max.x)},
+                               {double(box.min.y), double(box.max.y)},
+                               {double(box.min.z), double(box.max.z)}};
     Slopes slopes(formula);
     const Slope& s = slopes.over(sides);
     const auto low = [](double v) { return v - 1e-9 * std::fabs(v) - 1e-12; };
@@ -334,7 +340,8 @@ Result<float> formula_lipschitz(const Formula& formula, vec3 half_extents, float
         return s.value.lo;
     };
     // And between two points, which a jump cannot hide from.
-    const auto look_between = [&](const std::array<double, 3>& p, double at_p, const std::array<double, 3>& q, double at_q) {
+    const auto look_between = [&](const std::array<double, 3>& p, double at_p, const std::array<double, 3>& q,
+                                  double at_q) {
         double apart = 0, reach = 0;
         for (size_t k = 0; k < 3; ++k) {
             apart += (p[k] - q[k]) * (p[k] - q[k]);
@@ -397,7 +404,8 @@ Result<float> formula_lipschitz(const Formula& formula, vec3 half_extents, float
             next.bound = std::min(top.bound, bound_of(next.box));
             // A point inside, off the middle: kinks like the middles.
             std::array<double, 3>& p = points[part];
-            for (size_t k = 0; k < 3; ++k) p[k] = next.box[k].lo + (0.41 + 0.07 * double(k)) * (next.box[k].hi - next.box[k].lo);
+            for (size_t k = 0; k < 3; ++k)
+                p[k] = next.box[k].lo + (0.41 + 0.07 * double(k)) * (next.box[k].hi - next.box[k].lo);
             values[part] = look_at(p);
             cells.push(next);
             used += 2;
@@ -406,11 +414,13 @@ Result<float> formula_lipschitz(const Formula& formula, vec3 half_extents, float
     }
     const double proven = std::max({settled, cells.empty() ? 0.0 : cells.top().bound, steepest_seen}) * kRounding;
     if (broken)
-        return Error{formatted("its value at {} is not a finite number; keep it finite over half_extents", point_text(steepest_at)),
+        return Error{formatted("its value at {} is not a finite number; keep it finite over half_extents",
+                               point_text(steepest_at)),
                      ErrorKind::Input};
     if (declared > 0) {
         if (steepest_seen > double(declared) * 1.0001)
-            return Error{formatted("lipschitz {:.6g} does not hold: at {} the slope is {:.6g}; use at least {:.4g}, or leave \"lipschitz\" out",
+            return Error{formatted("lipschitz {:.6g} does not hold: at {} the slope is {:.6g}; use at least {:.4g}, or "
+                                   "leave \"lipschitz\" out",
                                    declared, point_text(steepest_at), steepest_seen, 1.01 * steepest_seen),
                          ErrorKind::Input};
         return declared;
@@ -419,10 +429,12 @@ Result<float> formula_lipschitz(const Formula& formula, vec3 half_extents, float
         const Cell& worst = cells.empty() ? whole : cells.top();
         std::array<double, 3> p{};
         for (size_t k = 0; k < 3; ++k) p[k] = 0.5 * (worst.box[k].lo + worst.box[k].hi);
-        return Error{formatted("no bound of its slope was found near {} (a jump, a pole or a root of 0?); say how steep it is with "
-                               "\"lipschitz\", or change it there",
-                               point_text(p)),
-                     ErrorKind::Input};
+        return Error{
+            formatted(
+                "no bound of its slope was found near {} (a jump, a pole or a root of 0?); say how steep it is with "
+                "\"lipschitz\", or change it there",
+                point_text(p)),
+            ErrorKind::Input};
     }
     return proven > 1e-6 ? float(proven) : 1.0f;  // a constant is as steep as we like
 }

@@ -12,9 +12,9 @@ namespace kiln::sdf {
 
 namespace {
 
-constexpr std::string_view kNames[] = {"x",      "y",     "z",   "constant", "store", "load", "copy", "negate",
-                                       "abs",    "sqrt",  "square", "floor", "sin",   "cos",  "exp",  "log",
-                                       "add",    "sub",   "mul", "div",      "min",   "max",  "atan2", "mod"};
+constexpr std::string_view kNames[] = {"x",   "y",    "z",      "constant", "store", "load", "copy",  "negate",
+                                       "abs", "sqrt", "square", "floor",    "sin",   "cos",  "exp",   "log",
+                                       "add", "sub",  "mul",    "div",      "min",   "max",  "atan2", "mod"};
 static_assert(std::size(kNames) == size_t(Fn::Mod) + 1);
 
 constexpr double kSmallestLogOperand = 1e-37;
@@ -65,11 +65,13 @@ double apply(Fn fn, double a, double b) {
 }
 
 uint32_t Builder::node(Fn fn, uint32_t a, uint32_t b, float constant) {
-    const uint64_t key = (uint64_t(fn) << 58) ^ (uint64_t(a) << 29) ^ b ^ (uint64_t(std::bit_cast<uint32_t>(constant)) << 7);
+    const uint64_t key =
+        (uint64_t(fn) << 58) ^ (uint64_t(a) << 29) ^ b ^ (uint64_t(std::bit_cast<uint32_t>(constant)) << 7);
     const auto [first, last] = known_.equal_range(key);
     for (auto it = first; it != last; ++it) {
         const FormulaNode& n = nodes_[it->second];
-        if (n.fn == fn && n.a == a && n.b == b && std::bit_cast<uint32_t>(n.constant) == std::bit_cast<uint32_t>(constant))
+        if (n.fn == fn && n.a == a && n.b == b &&
+            std::bit_cast<uint32_t>(n.constant) == std::bit_cast<uint32_t>(constant))
             return it->second;
     }
     if (nodes_.size() >= kMaxFormulaNodes) {

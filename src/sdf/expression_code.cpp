@@ -173,7 +173,9 @@ Prepared prepare(const std::string& data, vec3 half_extents, float declared) {
 
 }  // namespace
 
-FormulaCode formula_code(const Formula& formula, uint32_t most_registers) { return Allocator(formula, most_registers).run(); }
+FormulaCode formula_code(const Formula& formula, uint32_t most_registers) {
+    return Allocator(formula, most_registers).run();
+}
 
 Prepared prepare_formula(const std::string& data, vec3 half_extents, float declared) {
     struct Key {

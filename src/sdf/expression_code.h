@@ -36,6 +36,7 @@ struct PreparedFormula {
 inline constexpr std::string_view kModelText = "vm:", kModelFile = "file:";
 
 /// Reads the formula and bounds its slope. Answers are kept for the whole process: the same formula is prepared once. Any thread.
-Result<std::shared_ptr<const PreparedFormula>> prepare_formula(const std::string& data, vec3 half_extents, float declared);
+Result<std::shared_ptr<const PreparedFormula>> prepare_formula(const std::string& data, vec3 half_extents,
+                                                               float declared);
 
 }  // namespace kiln::sdf

@@ -18,12 +18,13 @@ struct Operation {
     Fn fn;
 };
 constexpr Operation kOperations[] = {
-    {"neg", Fn::Negate}, {"abs", Fn::Abs},   {"sqrt", Fn::Sqrt}, {"square", Fn::Square}, {"floor", Fn::Floor},
-    {"sin", Fn::Sin},    {"cos", Fn::Cos},   {"exp", Fn::Exp},   {"ln", Fn::Log},        {"add", Fn::Add},
-    {"sub", Fn::Sub},    {"mul", Fn::Mul},   {"div", Fn::Div},   {"min", Fn::Min},       {"max", Fn::Max},
+    {"neg", Fn::Negate},  {"abs", Fn::Abs}, {"sqrt", Fn::Sqrt}, {"square", Fn::Square}, {"floor", Fn::Floor},
+    {"sin", Fn::Sin},     {"cos", Fn::Cos}, {"exp", Fn::Exp},   {"ln", Fn::Log},        {"add", Fn::Add},
+    {"sub", Fn::Sub},     {"mul", Fn::Mul}, {"div", Fn::Div},   {"min", Fn::Min},       {"max", Fn::Max},
     {"atan2", Fn::Atan2}, {"mod", Fn::Mod},
 };
-constexpr std::string_view kOthers[] = {"const", "var-x", "var-y", "var-z", "ceil", "round", "tan", "asin", "acos", "atan", "recip", "pow"};
+constexpr std::string_view kOthers[] = {"const", "var-x", "var-y", "var-z", "ceil",  "round",
+                                        "tan",   "asin",  "acos",  "atan",  "recip", "pow"};
 
 struct Word {
     std::string_view text;
@@ -57,23 +58,27 @@ Result<Formula> read_vm(std::string_view text) {
         }
         if (count == 0) continue;
         const auto fail = [&](size_t word, std::string what) {
-            return Error{formatted("{}:{}: ", line, (word < count ? words[word].place : rest.size()) + 1) + what, ErrorKind::Input};
+            return Error{formatted("{}:{}: ", line, (word < count ? words[word].place : rest.size()) + 1) + what,
+                         ErrorKind::Input};
         };
         const auto shown = [](std::string_view word) { return word.substr(0, 40); };
-        if (count == 1) return fail(1, formatted("\"{}\" has no operation; write for example \"_1 var-x\"", shown(words[0].text)));
+        if (count == 1)
+            return fail(1, formatted("\"{}\" has no operation; write for example \"_1 var-x\"", shown(words[0].text)));
         const std::string_view name = words[0].text, op = words[1].text;
         if (names.contains(name)) return fail(0, formatted("\"{}\" is named twice; choose another name", shown(name)));
         const auto takes = [&](size_t n) { return count == 2 + n; };
         const auto wrong_count = [&](size_t n) {
-            return fail(std::min(count, 2 + n), formatted("{} takes {} operand{}, here are {}{}", op, n, n == 1 ? "" : "s",
-                                                          count == 5 ? "more than " : "", count == 5 ? 2 : count - 2));
+            return fail(std::min(count, 2 + n),
+                        formatted("{} takes {} operand{}, here are {}{}", op, n, n == 1 ? "" : "s",
+                                  count == 5 ? "more than " : "", count == 5 ? 2 : count - 2));
         };
         uint32_t in[2] = {0, 0};
         const auto look_up = [&](size_t n) -> std::optional<Error> {
             for (size_t i = 0; i < n; ++i) {
                 const auto found = names.find(words[2 + i].text);
                 if (found == names.end())
-                    return fail(2 + i, formatted("there is no value \"{}\" above; name one of the lines before", shown(words[2 + i].text)));
+                    return fail(2 + i, formatted("there is no value \"{}\" above; name one of the lines before",
+                                                 shown(words[2 + i].text)));
                 in[i] = found->second;
             }
             return std::nullopt;
@@ -95,7 +100,8 @@ Result<Formula> read_vm(std::string_view text) {
             double value = 0;
             const std::string_view digits = words[2].text;
             const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
-            if (error != std::errc{} || stop != digits.data() + digits.size() || !(std::fabs(value) <= kLargestConstant))
+            if (error != std::errc{} || stop != digits.data() + digits.size() ||
+                !(std::fabs(value) <= kLargestConstant))
                 return fail(2, formatted("\"{}\" is no number below 1e30; write for example 2.95", shown(digits)));
             node = build.constant(value);
         } else if (op == "var-x" || op == "var-y" || op == "var-z") {
@@ -105,7 +111,8 @@ Result<Formula> read_vm(std::string_view text) {
             if (!takes(2)) return wrong_count(2);
             if (auto error = look_up(2)) return std::move(*error);
             node = build.power(in[0], in[1]);
-        } else if (op == "ceil" || op == "round" || op == "tan" || op == "asin" || op == "acos" || op == "atan" || op == "recip") {
+        } else if (op == "ceil" || op == "round" || op == "tan" || op == "asin" || op == "acos" || op == "atan" ||
+                   op == "recip") {
             if (!takes(1)) return wrong_count(1);
             if (auto error = look_up(1)) return std::move(*error);
             node = op == "ceil"    ? build.ceil(in[0])
@@ -122,7 +129,8 @@ Result<Formula> read_vm(std::string_view text) {
             return fail(1, formatted("there is no operation \"{}\"; use one of{}", shown(op), all));
         }
         if (build.full()) return fail(0, formatted("more than {} operations; use a smaller model", kMaxFormulaNodes));
-        if (build.not_finite()) return fail(0, "this comes to no finite number (a division by 0?); change its constants");
+        if (build.not_finite())
+            return fail(0, "this comes to no finite number (a division by 0?); change its constants");
         names.emplace(name, node);
         last = node;
         any = true;

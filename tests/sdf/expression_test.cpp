@@ -60,26 +60,30 @@ struct Known {
 class EachText : public testing::TestWithParam<Known> {};
 TEST_P(EachText, HasItsValue) {
     // At the point (0.5, -2, 3).
-    EXPECT_NEAR(evaluate(parsed(GetParam().text), {0.5, -2, 3}), GetParam().value, 1e-6 * (1 + std::fabs(GetParam().value)))
+    EXPECT_NEAR(evaluate(parsed(GetParam().text), {0.5, -2, 3}), GetParam().value,
+                1e-6 * (1 + std::fabs(GetParam().value)))
         << GetParam().text;
 }
 INSTANTIATE_TEST_SUITE_P(
     Formula, EachText,
-    testing::Values(Known{"1 + 2*3", 7}, Known{"(1 + 2)*3", 9}, Known{"8/2/2", 2}, Known{"8 - 2 - 2", 4}, Known{"-x^2", -0.25},
-                    Known{"2^3^2", 512}, Known{"2^-2", 0.25}, Known{"-2*-y", -4}, Known{"+x", 0.5}, Known{"x - -y", -1.5},
-                    Known{"- - x", 0.5}, Known{"1e2 + .5", 100.5}, Known{"p.x + p.y + p.z", 1.5}, Known{"p.zyx.x", 3},
-                    Known{"length(p.xz)", std::sqrt(9.25)}, Known{"length(vec2(3, 4))", 5}, Known{"length(-3)", 3},
-                    Known{"dot(p, vec3(1, 2, 3))", 5.5}, Known{"cross(vec3(1, 0, 0), vec3(0, 1, 0)).z", 1},
+    testing::Values(Known{"1 + 2*3", 7}, Known{"(1 + 2)*3", 9}, Known{"8/2/2", 2}, Known{"8 - 2 - 2", 4},
+                    Known{"-x^2", -0.25}, Known{"2^3^2", 512}, Known{"2^-2", 0.25}, Known{"-2*-y", -4},
+                    Known{"+x", 0.5}, Known{"x - -y", -1.5}, Known{"- - x", 0.5}, Known{"1e2 + .5", 100.5},
+                    Known{"p.x + p.y + p.z", 1.5}, Known{"p.zyx.x", 3}, Known{"length(p.xz)", std::sqrt(9.25)},
+                    Known{"length(vec2(3, 4))", 5}, Known{"length(-3)", 3}, Known{"dot(p, vec3(1, 2, 3))", 5.5},
+                    Known{"cross(vec3(1, 0, 0), vec3(0, 1, 0)).z", 1},
                     Known{"cross(p, vec3(1, 2, 3)).y", 3 * 1 - 0.5 * 3}, Known{"normalize(vec3(0, 3, 4)).z", 0.8},
-                    Known{"distance(p, vec3(0.5, -2, 0))", 3}, Known{"max(p, 0).x + max(p, 0).y", 0.5}, Known{"(p*2).z", 6},
-                    Known{"(p + p).y", -4}, Known{"(2/p).x", 4}, Known{"min(3, 1, 2)", 1}, Known{"max(y, x, z, 0)", 3},
-                    Known{"mod(-0.5, 2)", 1.5}, Known{"mod(5, 3)", 2}, Known{"floor(-0.5)", -1}, Known{"ceil(-0.5)", 0},
-                    Known{"round(2.5)", 3}, Known{"fract(-0.25)", 0.75}, Known{"clamp(y, -1, 1)", -1}, Known{"mix(1, 3, x)", 2},
+                    Known{"distance(p, vec3(0.5, -2, 0))", 3}, Known{"max(p, 0).x + max(p, 0).y", 0.5},
+                    Known{"(p*2).z", 6}, Known{"(p + p).y", -4}, Known{"(2/p).x", 4}, Known{"min(3, 1, 2)", 1},
+                    Known{"max(y, x, z, 0)", 3}, Known{"mod(-0.5, 2)", 1.5}, Known{"mod(5, 3)", 2},
+                    Known{"floor(-0.5)", -1}, Known{"ceil(-0.5)", 0}, Known{"round(2.5)", 3},
+                    Known{"fract(-0.25)", 0.75}, Known{"clamp(y, -1, 1)", -1}, Known{"mix(1, 3, x)", 2},
                     Known{"smoothstep(0, 1, x)", 0.5}, Known{"smin(1, 1, 0.4)", 0.9}, Known{"smax(1, 1, 0.4)", 1.1},
                     Known{"smin(1, 5, 0.4)", 1}, Known{"sqrt(y)", 0}, Known{"square(y)", 4}, Known{"pow(z, 4)", 81},
-                    Known{"pow(z, 0.5)", std::sqrt(3.0)}, Known{"z^1.5", std::pow(3.0, 1.5)}, Known{"z^0", 1}, Known{"z^-1", 1.0 / 3},
-                    Known{"exp(1)", std::exp(1.0)}, Known{"log(z)", std::log(3.0)}, Known{"ln(z)", std::log(3.0)}, Known{"tan(x)", std::tan(0.5)},
-                    Known{"asin(x)", std::asin(0.5)}, Known{"acos(x)", std::acos(0.5)}, Known{"atan(y)", std::atan(-2.0)},
+                    Known{"pow(z, 0.5)", std::sqrt(3.0)}, Known{"z^1.5", std::pow(3.0, 1.5)}, Known{"z^0", 1},
+                    Known{"z^-1", 1.0 / 3}, Known{"exp(1)", std::exp(1.0)}, Known{"log(z)", std::log(3.0)},
+                    Known{"ln(z)", std::log(3.0)}, Known{"tan(x)", std::tan(0.5)}, Known{"asin(x)", std::asin(0.5)},
+                    Known{"acos(x)", std::acos(0.5)}, Known{"atan(y)", std::atan(-2.0)},
                     Known{"atan2(y, x)", std::atan2(-2.0, 0.5)}, Known{"cos(pi)", -1}, Known{"abs(y)", 2},
                     Known{"r = length(p.xz); h = y + 1; r*h", -std::sqrt(9.25)}, Known{"a = 2; b = a*a; a + b", 6}));
 
@@ -126,27 +130,33 @@ TEST_P(EachWrongText, IsAnErrorWithPlaceAndMend) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Formula, EachWrongText,
-    testing::Values(Wrong{"", "1:1", "a value is missing before the end", "write one"},
-                    Wrong{"x +", "1:4", "a value is missing before the end", "write one"},
-                    Wrong{"x + * y", "1:5", "a value is missing before \"*\"", "write one"},
-                    Wrong{"x\n  + q", "2:5", "there is no name \"q\"", "use x y z p pi"},
-                    Wrong{"sine(x)", "1:1", "there is no function \"sine\"", "sin cos"},
-                    Wrong{"sin x", "1:4", "sin is a function", "in brackets"}, Wrong{"sin(x, y)", "1:1", "sin has 2 operands", "takes 1 operand"},
-                    Wrong{"min(x)", "1:1", "min has 1 operand", "takes 2 or more"}, Wrong{"sin()", "1:5", "has no operands", "takes 1"},
-                    Wrong{"(x + 1", "1:1", "not closed", "add \")\""}, Wrong{"x + 1)", "1:6", "no bracket is open", "take \")\" out"},
-                    Wrong{"x, y", "1:2", "a comma outside", "take it out"}, Wrong{"(x, y)", "1:3", "a comma outside", "take it out"},
-                    Wrong{"2x", "1:2", "follows a number", "write *"}, Wrong{"x y", "1:3", "is not an operator", "use + - * / ^"},
-                    Wrong{"x % 2", "1:3", "is not an operator", "use + - * / ^"}, Wrong{"p", "1:1", "a vector of 3", "one number"},
-                    Wrong{"p.w", "1:2", "no component", "use .x"}, Wrong{"x.y", "1:2", "of a number", "take it out"},
-                    Wrong{"p.xy.z", "1:5", "vector of 2", "no such component"}, Wrong{"p.", "1:2", "follow a dot", "p.x"},
-                    Wrong{"(p + vec2(1, 2)).x", "1:4", "a vector of 3 meets a vector of 2", "same size"},
-                    Wrong{"vec3(p, 1, 2).x", "1:6", "made of numbers", "one component"}, Wrong{"1/0", "1:2", "no finite number", "change"},
-                    Wrong{"x/0", "1:2", "no finite number", "change"}, Wrong{"1e40", "1:1", "out of range", "below 1e30"},
-                    Wrong{"1e20 * 1e20", "1:6", "no finite number", "change"}, Wrong{"a = 1;", "1:7", "missing", "write one"},
-                    Wrong{"a = 1", "1:6", "nothing follows", "end it with"}, Wrong{"x = 1; x", "1:1", "has a meaning", "choose another"},
-                    Wrong{"a = 1; a = 2; a", "1:8", "has a meaning", "choose another"}, Wrong{"x; y", "1:2", "stands alone", "name"},
-                    Wrong{"cross(p.xy, p).x", "1:1", "two vectors of 3", "vec3"}, Wrong{"é", "1:1", "a value is missing before \"é\"", "write one"},
-                    Wrong{"1 + é", "1:5", "a value is missing", "write one"}, Wrong{"x ? 1", "1:3", "is not an operator", "use"}));
+    testing::Values(
+        Wrong{"", "1:1", "a value is missing before the end", "write one"},
+        Wrong{"x +", "1:4", "a value is missing before the end", "write one"},
+        Wrong{"x + * y", "1:5", "a value is missing before \"*\"", "write one"},
+        Wrong{"x\n  + q", "2:5", "there is no name \"q\"", "use x y z p pi"},
+        Wrong{"sine(x)", "1:1", "there is no function \"sine\"", "sin cos"},
+        Wrong{"sin x", "1:4", "sin is a function", "in brackets"},
+        Wrong{"sin(x, y)", "1:1", "sin has 2 operands", "takes 1 operand"},
+        Wrong{"min(x)", "1:1", "min has 1 operand", "takes 2 or more"},
+        Wrong{"sin()", "1:5", "has no operands", "takes 1"}, Wrong{"(x + 1", "1:1", "not closed", "add \")\""},
+        Wrong{"x + 1)", "1:6", "no bracket is open", "take \")\" out"},
+        Wrong{"x, y", "1:2", "a comma outside", "take it out"},
+        Wrong{"(x, y)", "1:3", "a comma outside", "take it out"}, Wrong{"2x", "1:2", "follows a number", "write *"},
+        Wrong{"x y", "1:3", "is not an operator", "use + - * / ^"},
+        Wrong{"x % 2", "1:3", "is not an operator", "use + - * / ^"}, Wrong{"p", "1:1", "a vector of 3", "one number"},
+        Wrong{"p.w", "1:2", "no component", "use .x"}, Wrong{"x.y", "1:2", "of a number", "take it out"},
+        Wrong{"p.xy.z", "1:5", "vector of 2", "no such component"}, Wrong{"p.", "1:2", "follow a dot", "p.x"},
+        Wrong{"(p + vec2(1, 2)).x", "1:4", "a vector of 3 meets a vector of 2", "same size"},
+        Wrong{"vec3(p, 1, 2).x", "1:6", "made of numbers", "one component"},
+        Wrong{"1/0", "1:2", "no finite number", "change"}, Wrong{"x/0", "1:2", "no finite number", "change"},
+        Wrong{"1e40", "1:1", "out of range", "below 1e30"}, Wrong{"1e20 * 1e20", "1:6", "no finite number", "change"},
+        Wrong{"a = 1;", "1:7", "missing", "write one"}, Wrong{"a = 1", "1:6", "nothing follows", "end it with"},
+        Wrong{"x = 1; x", "1:1", "has a meaning", "choose another"},
+        Wrong{"a = 1; a = 2; a", "1:8", "has a meaning", "choose another"},
+        Wrong{"x; y", "1:2", "stands alone", "name"}, Wrong{"cross(p.xy, p).x", "1:1", "two vectors of 3", "vec3"},
+        Wrong{"é", "1:1", "a value is missing before \"é\"", "write one"},
+        Wrong{"1 + é", "1:5", "a value is missing", "write one"}, Wrong{"x ? 1", "1:3", "is not an operator", "use"}));
 
 TEST(Formula, NestingIsLimitedByMemoryOnly) {
     const size_t deep = 100000;
@@ -163,8 +173,10 @@ TEST(Formula, NestingIsLimitedByMemoryOnly) {
     Edit edit = edit_of(sums + "y*x - 7" + std::string(20000, ')'));
     const auto program = compiled(edit);
     ASSERT_TRUE(program) << program.error().message;
-    EXPECT_NEAR(evaluate(view(*program), dvec3{0.25, 0, 0}),
-                std::max((5000.0 - 7) / double((*prepare_formula(edit.node.shape.data, {1, 1, 1}, 0))->lipschitz), -0.75), 1e-4);
+    EXPECT_NEAR(
+        evaluate(view(*program), dvec3{0.25, 0, 0}),
+        std::max((5000.0 - 7) / double((*prepare_formula(edit.node.shape.data, {1, 1, 1}, 0))->lipschitz), -0.75),
+        1e-4);
     // Too much of it is an error.
     std::string many;
     for (int i = 0; i < 110000; ++i) many += "sin(x + " + std::to_string(i) + ") + ";
@@ -174,7 +186,8 @@ TEST(Formula, NestingIsLimitedByMemoryOnly) {
 }
 
 TEST(Formula, AnyBytesAreReadOrRefusedWithAPlace) {
-    const std::string start = "r = length(p.xz) - 0.5; g = max(abs(y), -2.5e-1*sin(8*x)); smin(r, g, 0.1) + atan2(y, x)^2";
+    const std::string start =
+        "r = length(p.xz) - 0.5; g = max(abs(y), -2.5e-1*sin(8*x)); smin(r, g, 0.1) + atan2(y, x)^2";
     const std::string letters = "xyzp.+-*/^(),;= 0123456789esincoqrtab\n\t\"#\\%";
     std::mt19937 random(7);
     int accepted = 0;
@@ -200,7 +213,8 @@ TEST(Formula, AnyBytesAreReadOrRefusedWithAPlace) {
             }
         } else {
             size_t line = 0, column = 0;
-            ASSERT_EQ(std::sscanf(formula.error().message.c_str(), "%zu:%zu: ", &line, &column), 2) << formula.error().message;
+            ASSERT_EQ(std::sscanf(formula.error().message.c_str(), "%zu:%zu: ", &line, &column), 2)
+                << formula.error().message;
             ASSERT_GE(line, 1u);
             ASSERT_GE(column, 1u);
         }
@@ -211,10 +225,12 @@ TEST(Formula, AnyBytesAreReadOrRefusedWithAPlace) {
 // ---- .vm models.
 
 TEST(Model, LinesComputeWhatTheySay) {
-    const auto model = read_vm("# a drop\n_0 var-x\n_1 var-y\n_2 var-z\n_3 square _0\n_4 square _1\n_5 add _3 _4\n_6 square _2\n"
-                               "_7 add _5 _6\n\n_8 sqrt _7   # radius\n_9 const 1.5\n_a sub _8 _9\n_b neg _a\n_c abs _b\n_d sin _0\n_e cos _1\n"
-                               "_f mul _d _e\n_10 exp _f\n_11 ln _10\n_12 max _c _11\n_13 const 3\n_14 min _12 _13\n_15 div _14 _13\n"
-                               "_16 floor _0\n_17 mod _0 _13\n_18 atan2 _17 _13\n_19 add _18 _15\n_1a add _19 _16\n");
+    const auto model = read_vm(
+        "# a drop\n_0 var-x\n_1 var-y\n_2 var-z\n_3 square _0\n_4 square _1\n_5 add _3 _4\n_6 square _2\n"
+        "_7 add _5 _6\n\n_8 sqrt _7   # radius\n_9 const 1.5\n_a sub _8 _9\n_b neg _a\n_c abs _b\n_d sin _0\n_e cos "
+        "_1\n"
+        "_f mul _d _e\n_10 exp _f\n_11 ln _10\n_12 max _c _11\n_13 const 3\n_14 min _12 _13\n_15 div _14 _13\n"
+        "_16 floor _0\n_17 mod _0 _13\n_18 atan2 _17 _13\n_19 add _18 _15\n_1a add _19 _16\n");
     ASSERT_TRUE(model) << model.error().message;
     FormulaMaker random(1);
     for (int i = 0; i < 100; ++i) {
@@ -243,14 +259,19 @@ TEST_P(EachWrongModel, IsAnErrorWithPlaceAndMend) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Model, EachWrongModel,
-    testing::Values(Wrong{"", "1:1", "no operation", "write lines"}, Wrong{"# only this\n", "1:1", "no operation", "write lines"},
-                    Wrong{"_0 var-x\n_1", "2:3", "\"_1\" has no operation", "write"}, Wrong{"_0 frob", "1:4", "no operation \"frob\"", "use one of"},
+    testing::Values(Wrong{"", "1:1", "no operation", "write lines"},
+                    Wrong{"# only this\n", "1:1", "no operation", "write lines"},
+                    Wrong{"_0 var-x\n_1", "2:3", "\"_1\" has no operation", "write"},
+                    Wrong{"_0 frob", "1:4", "no operation \"frob\"", "use one of"},
                     Wrong{"_0 var-x\n_1 add _0", "2:10", "add takes 2 operands, here are 1", "2 operands"},
                     Wrong{"_0 var-x\n_1 neg _0 _0", "2:11", "neg takes 1 operand, here are 2", "1 operand"},
                     Wrong{"_0 add _1 _2", "1:8", "no value \"_1\" above", "lines before"},
-                    Wrong{"_0 var-x\n_0 var-y", "2:1", "named twice", "another name"}, Wrong{"_0 const x", "1:10", "no number", "write"},
-                    Wrong{"_0 const 1e39", "1:10", "no number below", "write"}, Wrong{"_0 const 0\n_1 const 1\n_2 div _1 _0", "3:1", "no finite", "change"},
-                    Wrong{"_0 var-x 3", "1:10", "takes 0 operands", "0"}, Wrong{"_0 var-x\n_1 max _0 _0 _0 _0", "2:14", "more than 2", "takes 2"}));
+                    Wrong{"_0 var-x\n_0 var-y", "2:1", "named twice", "another name"},
+                    Wrong{"_0 const x", "1:10", "no number", "write"},
+                    Wrong{"_0 const 1e39", "1:10", "no number below", "write"},
+                    Wrong{"_0 const 0\n_1 const 1\n_2 div _1 _0", "3:1", "no finite", "change"},
+                    Wrong{"_0 var-x 3", "1:10", "takes 0 operands", "0"},
+                    Wrong{"_0 var-x\n_1 max _0 _0 _0 _0", "2:14", "more than 2", "takes 2"}));
 
 TEST(Model, AnyBytesAreReadOrRefusedWithAPlace) {
     const std::string start = "_0 const 2.95\n_1 var-x\n_2 mul _1 _0\n_3 sqrt _2\n_4 max _3 _1\n# note\n_5 sub _4 _0\n";
@@ -272,7 +293,8 @@ TEST(Model, AnyBytesAreReadOrRefusedWithAPlace) {
         if (model) {
             ++accepted;
         } else {
-            ASSERT_EQ(std::sscanf(model.error().message.c_str(), "%zu:%zu: ", &line, &column), 2) << model.error().message;
+            ASSERT_EQ(std::sscanf(model.error().message.c_str(), "%zu:%zu: ", &line, &column), 2)
+                << model.error().message;
         }
     }
     EXPECT_GT(accepted, 50);
@@ -290,7 +312,8 @@ TEST(FormulaRange, HoldsEveryValueAndEverySlope) {
         const FormulaRange range = range_over(formula, box);
         for (int i = 0; i < 40; ++i) {
             double at[3], to[3];
-            const double lo[3] = {double(box.min.x), double(box.min.y), double(box.min.z)}, hi[3] = {double(box.max.x), double(box.max.y), double(box.max.z)};
+            const double lo[3] = {double(box.min.x), double(box.min.y), double(box.min.z)},
+                         hi[3] = {double(box.max.x), double(box.max.y), double(box.max.z)};
             for (int k = 0; k < 3; ++k) {
                 at[k] = make.in(lo[k], hi[k]);
                 to[k] = make.in(lo[k], hi[k]);
@@ -309,8 +332,11 @@ TEST(FormulaRange, HoldsEveryValueAndEverySlope) {
                     ASSERT_LE(rise, range.slope_high[k] * run + error) << "seed " << seed << " axis " << k;
                 }
             }
-            const double gap = std::sqrt((at[0] - to[0]) * (at[0] - to[0]) + (at[1] - to[1]) * (at[1] - to[1]) + (at[2] - to[2]) * (at[2] - to[2]));
-            ASSERT_LE(std::fabs(evaluate(formula, {to[0], to[1], to[2]}) - value), range.steepest * gap + 1e-11 * (1 + std::fabs(value))) << "seed " << seed;
+            const double gap = std::sqrt((at[0] - to[0]) * (at[0] - to[0]) + (at[1] - to[1]) * (at[1] - to[1]) +
+                                         (at[2] - to[2]) * (at[2] - to[2]));
+            ASSERT_LE(std::fabs(evaluate(formula, {to[0], to[1], to[2]}) - value),
+                      range.steepest * gap + 1e-11 * (1 + std::fabs(value)))
+                << "seed " << seed;
         }
     }
 }
@@ -320,8 +346,10 @@ TEST(FormulaLipschitz, IsNearlyTheLargestSlope) {
         const char* text;
         double slope;
     };
-    for (const Case& c : {Case{"length(p) - 1", 1}, Case{"x", 1}, Case{"3*x - 4*z", 5}, Case{"length(p) - 1 - 0.1*sin(8*x)", 1.8}, Case{"x^2", 2},
-                          Case{"max(length(p.xz) - 0.5, abs(y) - 0.3)", 1}, Case{"sqrt(0.01 + x*x + y*y)", 1}, Case{"2", 1}, Case{"length(max(abs(p) - 0.3, 0))", 1}}) {
+    for (const Case& c :
+         {Case{"length(p) - 1", 1}, Case{"x", 1}, Case{"3*x - 4*z", 5}, Case{"length(p) - 1 - 0.1*sin(8*x)", 1.8},
+          Case{"x^2", 2}, Case{"max(length(p.xz) - 0.5, abs(y) - 0.3)", 1}, Case{"sqrt(0.01 + x*x + y*y)", 1},
+          Case{"2", 1}, Case{"length(max(abs(p) - 0.3, 0))", 1}}) {
         const auto slope = formula_lipschitz(parsed(c.text), {1, 1, 1}, 0);
         ASSERT_TRUE(slope) << c.text << ": " << slope.error().message;
         EXPECT_GE(double(*slope), c.slope * 0.99) << c.text;
@@ -334,8 +362,10 @@ TEST(FormulaLipschitz, AsksWhereThereIsNoBoundAndRefusesWhatDoesNotHold) {
         const auto slope = formula_lipschitz(parsed(text), {1, 1, 1}, 0);
         ASSERT_FALSE(slope) << text;
         const std::string& message = slope.error().message;
-        const bool asks = message.find("\"lipschitz\"") != std::string::npos && message.find("near (") != std::string::npos;
-        const bool pole = message.find("at (") != std::string::npos && message.find("not a finite number") != std::string::npos;
+        const bool asks =
+            message.find("\"lipschitz\"") != std::string::npos && message.find("near (") != std::string::npos;
+        const bool pole =
+            message.find("at (") != std::string::npos && message.find("not a finite number") != std::string::npos;
         EXPECT_TRUE(asks || (pole && std::string_view(text).find('/') != std::string_view::npos)) << message;
         // Nor does any number make a jump or a pole less steep.
         EXPECT_FALSE(formula_lipschitz(parsed(text), {1, 1, 1}, 5)) << text;
@@ -349,11 +379,16 @@ TEST(FormulaLipschitz, AsksWhereThereIsNoBoundAndRefusesWhatDoesNotHold) {
     const auto refused = formula_lipschitz(parsed("length(p) - 1 - 0.1*sin(8*x)"), {1, 1, 1}, 1.5f);
     ASSERT_FALSE(refused);
     double x = 0, y = 0, z = 0, slope = 0;
-    ASSERT_EQ(std::sscanf(refused.error().message.c_str(), "lipschitz 1.5 does not hold: at (%lf, %lf, %lf) the slope is %lf", &x, &y, &z, &slope), 4)
+    ASSERT_EQ(std::sscanf(refused.error().message.c_str(),
+                          "lipschitz 1.5 does not hold: at (%lf, %lf, %lf) the slope is %lf", &x, &y, &z, &slope),
+              4)
         << refused.error().message;
-    const auto f = [](double u, double v, double w) { return std::sqrt(u * u + v * v + w * w) - 0.1 * std::sin(8 * u); };
+    const auto f = [](double u, double v, double w) {
+        return std::sqrt(u * u + v * v + w * w) - 0.1 * std::sin(8 * u);
+    };
     const double h = 1e-5;
-    const double dx = f(x + h, y, z) - f(x - h, y, z), dy = f(x, y + h, z) - f(x, y - h, z), dz = f(x, y, z + h) - f(x, y, z - h);
+    const double dx = f(x + h, y, z) - f(x - h, y, z), dy = f(x, y + h, z) - f(x, y - h, z),
+                 dz = f(x, y, z + h) - f(x, y, z - h);
     EXPECT_GT(std::sqrt(dx * dx + dy * dy + dz * dz) / (2 * h), 1.5) << refused.error().message;
     EXPECT_TRUE(formula_lipschitz(parsed("length(p) - 1 - 0.1*sin(8*x)"), {1, 1, 1}, 1.81f));
 }
@@ -382,9 +417,12 @@ std::vector<Made> random_worlds(uint32_t seed, int count) {
         FormulaMaker make(seed + 7919 * n);
         Made made;
         for (int e = 0; e < 3; ++e) {
-            Edit edit = edit_of("(" + make.make(5, true).text + ") - 0.1", {float(make.in(0.3, 1)), float(make.in(0.3, 1)), float(make.in(0.3, 1))});
+            Edit edit = edit_of("(" + make.make(5, true).text + ") - 0.1",
+                                {float(make.in(0.3, 1)), float(make.in(0.3, 1)), float(make.in(0.3, 1))});
             edit.node.transform.position = {float(make.in(-1, 1)), float(make.in(-1, 1)), float(make.in(-1, 1))};
-            if (make.below(2) == 0) edit.node.transform.rotation = axis_angle(normalize(vec3{1, float(make.in(-1, 1)), 0.3f}), float(make.in(-3, 3)));
+            if (make.below(2) == 0)
+                edit.node.transform.rotation =
+                    axis_angle(normalize(vec3{1, float(make.in(-1, 1)), 0.3f}), float(make.in(-3, 3)));
             if (make.below(3) == 0) edit.node.transform.scale = {1.5f, 0.75f, 1};
             if (make.below(3) == 0) edit.node.domain.push_back(Twist{.rate = 0.7f});
             if (make.below(4) == 0) edit.node.domain.push_back(Mirror{});
@@ -420,7 +458,8 @@ TEST(ExpressionShape, TapeEqualsTheJudgeAndIsOneLipschitz) {
             ASSERT_NEAR(d, judge->distance({p.x, p.y, p.z}), 2e-5 * (1 + std::fabs(d)));
             const vec3 q = p + random_point(random, i % 2 == 0 ? 0.05 : 1);
             const double gap = std::sqrt(double(dot(p - q, p - q)));
-            ASSERT_LE(std::fabs(d - evaluate(view(made.program), dvec3{q.x, q.y, q.z})), gap * (1 + 1e-5) + 1e-6) << made.edits[0].node.shape.data;
+            ASSERT_LE(std::fabs(d - evaluate(view(made.program), dvec3{q.x, q.y, q.z})), gap * (1 + 1e-5) + 1e-6)
+                << made.edits[0].node.shape.data;
         }
     }
 }
@@ -441,7 +480,9 @@ TEST(ExpressionShape, IsCutToItsHalfExtents) {
 TEST(ExpressionShape, EveryInstructionSetGivesTheSameBytesAndStaysNearDouble) {
     auto worlds = random_worlds(200, 20);
     // One that keeps values in memory, and one with every function, jumps included.
-    for (const std::string& text : {many_alive(40).text(), std::string("sin(x)+cos(y)+exp(z)+log(x+2)+sqrt(y)+abs(z)+floor(3*x)+mod(y, 0.3)+atan2(x, y)+x/(y*y+1)-min(x, y)*max(y, z)"),
+    for (const std::string& text : {many_alive(40).text(),
+                                    std::string("sin(x)+cos(y)+exp(z)+log(x+2)+sqrt(y)+abs(z)+floor(3*x)+mod(y, "
+                                                "0.3)+atan2(x, y)+x/(y*y+1)-min(x, y)*max(y, z)"),
                                     std::string("sin(1e9*x) + 1/x + sqrt(-1-x*x) + 0*exp(88*x)*exp(88*x)*exp(88*x)")}) {
         const bool jumps = text[0] == 's';
         Made made;
@@ -460,7 +501,8 @@ TEST(ExpressionShape, EveryInstructionSetGivesTheSameBytesAndStaysNearDouble) {
                 made.program.code.push_back(in);
             }
             made.program.params.insert(made.program.params.end(), code.params.begin(), code.params.end());
-            made.program.code.push_back(Instruction::make(Opcode::Result, 0, 0, code.result, 0, uint32_t(made.program.params.size())));
+            made.program.code.push_back(
+                Instruction::make(Opcode::Result, 0, 0, code.result, 0, uint32_t(made.program.params.size())));
             made.program.params.insert(made.program.params.end(), {1.0f, 0.0f, 0.0f});
         } else {
             EXPECT_GT(made.program.memory_slots, 0u);
@@ -479,7 +521,8 @@ TEST(ExpressionShape, EveryInstructionSetGivesTheSameBytesAndStaysNearDouble) {
         for (Isa isa : {Isa::Sse4, Isa::Avx2, Isa::Avx512}) {
             if (!has_isa(isa)) continue;
             evaluate(view(made.program), cloud.points(), other.data(), isa);
-            ASSERT_EQ(std::memcmp(one.data(), other.data(), 4 * one.size()), 0) << "isa " << int(isa) << " " << made.edits[0].node.shape.data;
+            ASSERT_EQ(std::memcmp(one.data(), other.data(), 4 * one.size()), 0)
+                << "isa " << int(isa) << " " << made.edits[0].node.shape.data;
             evaluate_materials(view(made.program), cloud.points(), other.data(), other_mix.data(), false, isa);
             for (size_t i = 0; i < one.size(); ++i) {
                 ASSERT_EQ(one_mix[i].id0, other_mix[i].id0);
@@ -534,8 +577,8 @@ TEST(ExpressionShape, PrunedTapeHasTheFullTapesBitsInItsBall) {
         std::string text = "9";
         for (int i = 0; i < 60; ++i) {
             FormulaMaker at(uint32_t(1000 * n + i));
-            text = "min(" + text + ", length(p - vec3(" + std::to_string(at.in(-0.9, 0.9)) + ", " + std::to_string(at.in(-0.9, 0.9)) + ", " +
-                   std::to_string(at.in(-0.9, 0.9)) + ")) - 0.05)";
+            text = "min(" + text + ", length(p - vec3(" + std::to_string(at.in(-0.9, 0.9)) + ", " +
+                   std::to_string(at.in(-0.9, 0.9)) + ", " + std::to_string(at.in(-0.9, 0.9)) + ")) - 0.05)";
         }
         if (n == 2) text = many_alive(30).names + "max(" + text + ", -(" + many_alive(30).value + ")*0.05)";
         Made made;
@@ -571,7 +614,8 @@ TEST(ExpressionShape, PrunedTapeHasTheFullTapesBitsInItsBall) {
             std::vector<MaterialMix> mix_a(64), mix_b(64);
             evaluate_materials(view(made.program), cloud.points(), a.data(), mix_a.data());
             evaluate_materials(view(made.program, fine), cloud.points(), b.data(), mix_b.data());
-            ASSERT_EQ(std::memcmp(a.data(), b.data(), 4 * a.size()), 0) << made.edits[0].node.shape.data << " ball " << ball;
+            ASSERT_EQ(std::memcmp(a.data(), b.data(), 4 * a.size()), 0)
+                << made.edits[0].node.shape.data << " ball " << ball;
             for (size_t i = 0; i < a.size(); ++i) {
                 ASSERT_EQ(mix_a[i].id0, mix_b[i].id0);
                 ASSERT_EQ(mix_a[i].weight, mix_b[i].weight);
@@ -593,7 +637,8 @@ TEST(ExpressionShape, FaultsNameTheEditAndWhatToDo) {
     EXPECT_NE(missing.error().message.find("not loaded"), std::string::npos);
     const auto model = compiled(edit_of("vm:_0 var-x\n_1 frob _0\n"));
     ASSERT_FALSE(model);
-    EXPECT_NE(model.error().message.find("model 2:4: there is no operation"), std::string::npos) << model.error().message;
+    EXPECT_NE(model.error().message.find("model 2:4: there is no operation"), std::string::npos)
+        << model.error().message;
 }
 
 }  // namespace

@@ -37,7 +37,8 @@ public:
             default: {
                 const float number = std::round(float(in(-2, 2)) * 64) / 64;  // exact in text, float and double
                 const double v = double(number);
-                return {v < 0 ? "(" + std::to_string(v) + ")" : std::to_string(v), [v](double, double, double) { return v; }};
+                return {v < 0 ? "(" + std::to_string(v) + ")" : std::to_string(v),
+                        [v](double, double, double) { return v; }};
             }
             }
         }
@@ -51,14 +52,16 @@ public:
         case 2:
             return {"abs(" + a.text + ")", [f](double x, double y, double z) { return std::fabs(f(x, y, z)); }};
         case 9:
-            return {"sqrt(" + a.text + ")", [f](double x, double y, double z) { return std::sqrt(std::max(f(x, y, z), 0.0)); }};
+            return {"sqrt(" + a.text + ")",
+                    [f](double x, double y, double z) { return std::sqrt(std::max(f(x, y, z), 0.0)); }};
         case 10:
             return {"floor(" + a.text + ")", [f](double x, double y, double z) { return std::floor(f(x, y, z)); }};
         case 11:
             return {"exp(clamp(" + a.text + ", -3, 3))",
                     [f](double x, double y, double z) { return std::exp(std::min(std::max(f(x, y, z), -3.0), 3.0)); }};
         case 12:
-            return {"log(0.5 + " + a.text + "^2)", [f](double x, double y, double z) { return std::log(0.5 + f(x, y, z) * f(x, y, z)); }};
+            return {"log(0.5 + " + a.text + "^2)",
+                    [f](double x, double y, double z) { return std::log(0.5 + f(x, y, z) * f(x, y, z)); }};
         default:
             break;
         }
@@ -66,25 +69,31 @@ public:
         const auto g = b.value;
         switch (below(smooth ? 6 : 10)) {
         case 0:
-            return {"(" + a.text + " + " + b.text + ")", [f, g](double x, double y, double z) { return f(x, y, z) + g(x, y, z); }};
+            return {"(" + a.text + " + " + b.text + ")",
+                    [f, g](double x, double y, double z) { return f(x, y, z) + g(x, y, z); }};
         case 1:
-            return {"(" + a.text + " - " + b.text + ")", [f, g](double x, double y, double z) { return f(x, y, z) - g(x, y, z); }};
+            return {"(" + a.text + " - " + b.text + ")",
+                    [f, g](double x, double y, double z) { return f(x, y, z) - g(x, y, z); }};
         case 2:
-            return {"min(" + a.text + ", " + b.text + ")", [f, g](double x, double y, double z) { return std::min(f(x, y, z), g(x, y, z)); }};
+            return {"min(" + a.text + ", " + b.text + ")",
+                    [f, g](double x, double y, double z) { return std::min(f(x, y, z), g(x, y, z)); }};
         case 3:
-            return {"max(" + a.text + ", " + b.text + ")", [f, g](double x, double y, double z) { return std::max(f(x, y, z), g(x, y, z)); }};
+            return {"max(" + a.text + ", " + b.text + ")",
+                    [f, g](double x, double y, double z) { return std::max(f(x, y, z), g(x, y, z)); }};
         case 4:
             return {"(" + a.text + " * cos(" + b.text + "))",
                     [f, g](double x, double y, double z) { return f(x, y, z) * std::cos(g(x, y, z)); }};
         case 5:
-            return {"((" + a.text + " + 2*" + b.text + ")/3)", [f, g](double x, double y, double z) { return (f(x, y, z) + 2 * g(x, y, z)) / 3; }};
+            return {"((" + a.text + " + 2*" + b.text + ")/3)",
+                    [f, g](double x, double y, double z) { return (f(x, y, z) + 2 * g(x, y, z)) / 3; }};
         case 6:
             return {"atan2(" + a.text + ", " + b.text + ")", [f, g](double x, double y, double z) {
                         const double u = f(x, y, z), v = g(x, y, z);
                         return u == 0 && v == 0 ? 0 : std::atan2(u, v);
                     }};
         case 7:
-            return {"mod(" + a.text + ", 0.75)", [f](double x, double y, double z) { return f(x, y, z) - 0.75 * std::floor(f(x, y, z) / 0.75); }};
+            return {"mod(" + a.text + ", 0.75)",
+                    [f](double x, double y, double z) { return f(x, y, z) - 0.75 * std::floor(f(x, y, z) / 0.75); }};
         case 8:
             return {"(" + a.text + "/(0.5 + square(" + b.text + ")))",
                     [f, g](double x, double y, double z) { return f(x, y, z) / (0.5 + g(x, y, z) * g(x, y, z)); }};

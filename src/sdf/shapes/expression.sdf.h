@@ -9,5 +9,7 @@ struct Expression {
 };
 
 #ifdef KILN_HOST
-KILN_SDF Bounds bounds_expression(Expression s) { return symmetric(s.half_extents.x, s.half_extents.y, s.half_extents.z); }
+KILN_SDF Bounds bounds_expression(Expression s) {
+    return symmetric(s.half_extents.x, s.half_extents.y, s.half_extents.z);
+}
 #endif
