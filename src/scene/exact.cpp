@@ -84,7 +84,7 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
     constexpr size_t kEditWord = 2;  // of a Shape's numbers: scale, material, edit
     const auto has_edit = [](const sdf::Instruction& i) {
         return i.opcode() == sdf::Opcode::Shape || i.opcode() == sdf::Opcode::Constant ||
-               i.opcode() == sdf::Opcode::Result;
+               i.opcode() == sdf::Opcode::Result || i.opcode() == sdf::Opcode::Custom;
     };
     std::vector<uint32_t> edits;
     for (const sdf::Instruction& i : code)

@@ -4,6 +4,7 @@
 // become unions of their nearest copies. Then registers are dealt out and the code is written.
 
 #include "sdf/bounds.h"
+#include "sdf/custom.h"
 #include "sdf/expression_code.h"
 #include "sdf/program.h"
 #include "sdf/resolve.h"
@@ -82,8 +83,9 @@ struct ChainStep {
 struct Binary {
     enum class Kind : uint8_t { Leaf, Value, Bound, Combine };
     Kind kind = Kind::Leaf;
-    bool lacks_material = false;  // some leaf under it carries none
-    uint8_t need = 1;             // registers
+    bool lacks_material = false;    // some leaf under it carries none
+    uint8_t need = 1;               // registers
+    Opcode opcode = Opcode::Shape;  // of a Leaf
     uint32_t aux = 0;
     uint32_t chain = kNone;
     uint32_t param = 0;
@@ -374,7 +376,18 @@ private:
 
     void add_leaf(const Task& task) {
         const Shape& shape = task.node->shape;
-        if (shape_rows()[shape.kind].how == KindRow::Formula) return add_formula(task);
+        if (shape_rows()[shape.kind].how == KindRow::Formula) {
+            const PreparedFormula& prepared = resolved_.formula_of(shape);
+            Binary formula;
+            formula.source = &prepared.formula;
+            return add_boxed(task, formula, prepared.lipschitz, {});
+        }
+        if (shape_rows()[shape.kind].how == KindRow::Custom) {
+            Binary custom;
+            custom.opcode = Opcode::Custom;
+            custom.aux = custom_index(shape.kind);
+            return add_boxed(task, custom, check_custom(shape)->lipschitz, shape.params);
+        }
         const std::array<float, kMaxParams> params = resolved_.params_of(shape);
         Binary leaf;
         leaf.aux = shape.kind;
@@ -390,10 +403,8 @@ private:
 
     // The bounded leaf of architecture §4 without a margin: the point is held in the box, where the slope's bound is proven, so
     // max(value, distance from the box) is 1-Lipschitz everywhere.
-    void add_formula(Task task) {
-        const Shape& shape = task.node->shape;
-        const PreparedFormula& prepared = resolved_.formula_of(shape);
-        const Box3 box = shape_bounds(shape);
+    void add_boxed(Task task, Binary leaf, float lipschitz, std::span<const float> params) {
+        const Box3 box = shape_bounds(task.node->shape);
         const uint32_t chain = flush(task.chain, task.pending);
         Binary bound;
         bound.kind = Binary::Kind::Bound;
@@ -402,11 +413,9 @@ private:
             add_params({float(task.scale), kEmpty, box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z});
         task.parent = add_node(task, bound);
         task.right = false;
-        Binary leaf;
-        leaf.source = &prepared.formula;
         leaf.chain = add_step(chain, Opcode::PointClamp, 0,
                               add_params({box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}));
-        leaf.param = add_params({float(task.scale / double(prepared.lipschitz)), float(task.material), float(row_)});
+        leaf.param = add_params({float(task.scale / double(lipschitz)), float(task.material), float(row_)}, params);
         leaf.lacks_material = task.material == kNoMaterial;
         add_node(task, leaf);
     }
@@ -480,7 +489,7 @@ private:
                     emit_formula(n, v.dst);
                     continue;
                 }
-                code_.push_back(Instruction::make(Opcode::Shape, n.aux, v.dst, 0, 0, n.param));
+                code_.push_back(Instruction::make(n.opcode, n.aux, v.dst, 0, 0, n.param));
             } else if (n.kind != Binary::Kind::Combine) {
                 if (v.stage == 0) {
                     stack.push_back({v.node, v.dst, 1});

@@ -37,6 +37,9 @@ namespace kiln::sdf {
 // Shapes whose leaves run over a whole brick in one loop.
 inline constexpr uint32_t kFusedSphere = uint32_t(ShapeKind::Sphere);
 inline constexpr uint32_t kFusedBox = uint32_t(ShapeKind::Box);
+/// Custom instructions' way out of the lanes (custom.h).
+void custom_points(uint32_t index, const float* params, const double* x, const double* y, const double* z, int count,
+                   double* out);
 }  // namespace kiln::sdf
 
 // Texts shared with GLSL name parameters they do not always use.

@@ -67,6 +67,21 @@ static void formula_step(Registers& r, uint32_t word, const float* w) {
 // The distance a formula or a user's shape stands for: nothing where it is no number.
 static inline real cleaned(real v) { return select(lt(abs(v), real(param(kEmpty))), v, real(param(kEmpty))); }
 
+// A user's function sees doubles, so that one function serves every lane type, exact answers among them.
+static void custom_step(Chunk& dst, const Chunk* point, uint32_t index, const float* w) {
+    constexpr int kCount = int(sizeof(Chunk) / sizeof(param));
+    param lanes[kCount];
+    double p[3][kCount], d[kCount];
+    for (int axis = 0; axis < 3; ++axis) {
+        __builtin_memcpy(lanes, &point[axis], sizeof lanes);
+        for (int i = 0; i < kCount; ++i) p[axis][i] = double(lanes[i]);
+    }
+    custom_points(index, w + 3, p[0], p[1], p[2], kCount, d);
+    for (int i = 0; i < kCount; ++i) lanes[i] = param(d[i]);
+    __builtin_memcpy(&dst, lanes, sizeof lanes);
+    for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = cleaned(dst.v[i]) * param(w[0]);
+}
+
 // One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
 static __attribute__((noinline)) void step(Registers& r, uint32_t word, const float* w, Samples samples) {
     const uint32_t aux = (word >> 5) & 255u;
@@ -110,6 +125,7 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
             }
             break;
         case Opcode::Arithmetic: formula_step(r, word, w); break;
+        case Opcode::Custom: custom_step(dst, r.point, aux, w); break;
         case Opcode::Result: {
             const Chunk& from = r.value[(word >> 18) & 31u];
             for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = cleaned(from.v[i]) * param(w[0]);
@@ -223,6 +239,7 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
                 break;
             case Opcode::Shape:
             case Opcode::Result:
+            case Opcode::Custom:
                 step(r, word, w, samples);
                 for (int i = 0; i < KILN_VECTORS; ++i) mix[d].v[i] = make_mix(real(param(w[slot])), none, zero);
                 break;

@@ -17,8 +17,8 @@ namespace {
 
 constexpr uint32_t kInputs = 3;
 constexpr uint32_t kNone = UINT32_MAX;
-constexpr int kSplit = 4;    // a tile becomes kSplit² = kTileLanes
-constexpr int kBlock = 8;    // pixels a side of a chunk of 64 points
+constexpr int kSplit = 4;      // a tile becomes kSplit² = kTileLanes
+constexpr int kBlock = 8;      // pixels a side of a chunk of 64 points
 constexpr int kSmallest = 16;  // pixels a side of tiles that are not cut further
 
 struct Code {
@@ -189,10 +189,12 @@ public:
                 }
                 alignas(64) float values[64];
                 points_(code.ops.data(), code.ops.size(), registers, code.result, values);
-                const int columns = std::min(kBlock, view_.size_px - column0), rows = std::min(kBlock, view_.size_px - row0);
+                const int columns = std::min(kBlock, view_.size_px - column0),
+                          rows = std::min(kBlock, view_.size_px - row0);
                 for (int row = 0; row < rows; ++row) {
                     uint8_t* to = pixels_.data() + size_t(row0 + row) * size_t(view_.size_px) + size_t(column0);
-                    for (int column = 0; column < columns; ++column) to[column] = values[row * kBlock + column] < 0 ? 255 : 0;
+                    for (int column = 0; column < columns; ++column)
+                        to[column] = values[row * kBlock + column] < 0 ? 255 : 0;
                 }
                 stats.point_operations += 64 * code.ops.size();
             }
@@ -202,7 +204,8 @@ public:
     void fill(int left, int top, int side, uint8_t with) {
         const int right = std::min(left + side, view_.size_px);
         for (int row = top; row < std::min(top + side, view_.size_px); ++row)
-            std::fill(pixels_.begin() + ptrdiff_t(row) * view_.size_px + left, pixels_.begin() + ptrdiff_t(row) * view_.size_px + right, with);
+            std::fill(pixels_.begin() + ptrdiff_t(row) * view_.size_px + left,
+                      pixels_.begin() + ptrdiff_t(row) * view_.size_px + right, with);
     }
 
     // Cuts the square into 4x4 tiles and calls below(tile code, left, top, side) for those that are not decided; it may use deeper levels.
@@ -222,7 +225,8 @@ public:
         alignas(64) float out[2 * kTileLanes];
         Level& here = levels_[level];
         here.choices.resize(2 * size_t(code.choices) + 2);
-        tiles_(code.ops.data(), code.ops.size(), bounds, memory_.at(32 * size_t(code.registers)), code.result, here.choices.data(), out);
+        tiles_(code.ops.data(), code.ops.size(), bounds, memory_.at(32 * size_t(code.registers)), code.result,
+               here.choices.data(), out);
         stats.interval_operations += code.ops.size();
         for (int i = 0; i < kTileLanes; ++i) {
             const int l = left + i % kSplit * part, t = top + i / kSplit * part;
@@ -243,7 +247,8 @@ public:
 
     void paint(const Code& code, int left, int top, int side, size_t level) {
         if (side <= kSmallest || side % (kSplit * kBlock) != 0) return points(code, left, top, side);
-        cut(code, left, top, side, level, [this, level](const Code& own, int l, int t, int part) { paint(own, l, t, part, level + 1); });
+        cut(code, left, top, side, level,
+            [this, level](const Code& own, int l, int t, int part) { paint(own, l, t, part, level + 1); });
     }
 
     FormulaImageStats stats;
@@ -284,7 +289,9 @@ std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& vi
         first.points(code, 0, 0, side);
         sum = first.stats;
     } else {
-        first.cut(code, 0, 0, side, 0, [&](const Code& own, int l, int t, int part) { tiles.push_back({own, l, t, part}); });
+        first.cut(code, 0, 0, side, 0, [&](const Code& own, int l, int t, int part) {
+            tiles.push_back({own, l, t, part});
+        });
         sum = first.stats;
         std::vector<FormulaImageStats> each(tiles.size());
         parallel_for(tiles.size(), [&](int i) {

@@ -12,7 +12,7 @@
 namespace kiln::sdf {
 
 struct FormulaView {
-    int size_px = 1024;  ///< a side
+    int size_px = 1024;    ///< a side
     float half_width = 1;  ///< the picture shows |x|, |y| <= half_width, +y up, pixel centres
     float z = 0;
 };
@@ -24,7 +24,8 @@ struct FormulaImageStats {
 };
 
 /// 255 where the formula is below 0, else 0; row by row from the top. On as many threads as parallel_for has.
-std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& view, Isa isa = best_isa(), FormulaImageStats* stats = nullptr);
+std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& view, Isa isa = best_isa(),
+                                   FormulaImageStats* stats = nullptr);
 /// The same, every operation at every pixel.
 std::vector<uint8_t> formula_image_slow(const Formula& formula, const FormulaView& view, Isa isa = best_isa());
 

@@ -58,6 +58,7 @@ enum class Opcode : uint32_t {
     // Formulas (expression.h): registers hold numbers here, not distances, until Result.
     Arithmetic,  // R[dst] = Fn(aux & kFnBits)(R[a], R[b])   kNumberA, kNumberB: that operand is the one number; Store, Load: slot
     Result,  // R[dst] = s · R[a], kEmpty for NaN        s, material, edit
+    Custom,  // R[dst] = s · custom[aux](P), kEmpty for NaN   s, material, edit, its params. Not on the GPU
 };
 inline constexpr uint32_t kMayLackMaterial = 4;
 inline constexpr uint32_t kFnBits = 63, kNumberA = 64, kNumberB = 128;
@@ -80,6 +81,12 @@ struct Instruction {
     constexpr uint32_t dst() const { return (word >> 13) & 31u; }
     constexpr uint32_t a() const { return (word >> 18) & 31u; }
     constexpr uint32_t b() const { return (word >> 23) & 31u; }
+    /// Has no twin on the GPU: a formula's values in memory, a program's own shape.
+    constexpr bool cpu_only() const {
+        if (opcode() == Opcode::Custom) return true;
+        const Fn fn = Fn(aux() & kFnBits);
+        return opcode() == Opcode::Arithmetic && (fn == Fn::Store || fn == Fn::Load);
+    }
     constexpr bool starts_chain() const { return opcode() <= Opcode::PointAffine; }
     constexpr bool moves_point() const { return opcode() <= Opcode::PointClamp; }
     friend bool operator==(const Instruction&, const Instruction&) = default;

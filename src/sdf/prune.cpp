@@ -214,6 +214,7 @@ float prune_register(const TapeView& tape, vec3 center, float radius, uint32_t r
         if (wanted == Need::None) continue;
         switch (op) {
         case Opcode::Shape:
+        case Opcode::Custom:
             need[dst] = Need::None;
             if (wanted == Need::Material) {
                 kept.push_back(Instruction::make(Opcode::Constant, 0, dst, 0, 0, in.param));

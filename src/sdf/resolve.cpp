@@ -14,6 +14,7 @@
 #include "sdf/resolve.h"
 
 #include "sdf/bounds.h"
+#include "sdf/custom.h"
 #include "sdf/library/library.h"
 #include "sdf/tables.h"
 
@@ -27,6 +28,7 @@ namespace {
 
 constexpr float kSmallestRate = 1e-18f;
 
+bool is_composite(const Shape& shape) { return shape_rows()[shape.kind].how == KindRow::Composite; }
 bool is_copies(const Warp& warp) { return warp_rows()[warp.kind].how == KindRow::Copies; }
 
 Error fail(Fault* fault, const Fault& where, std::string message) {
@@ -187,7 +189,7 @@ private:
     // Every composite shape in reach becomes one object per distinct parameter set.
     void collect_composites() {
         const auto add = [&](const Node& node) {
-            if (node.kind != Node::Kind::Shape || node.shape.kind < primitive_count()) return;
+            if (node.kind != Node::Kind::Shape || !is_composite(node.shape)) return;
             const auto key = std::pair(node.shape.kind, node.shape.params);
             const auto index = uint32_t(out_.source.objects.size() + out_.composites.size());
             if (out_.composite_index.emplace(key, index).second) {
@@ -207,7 +209,7 @@ private:
     // Depth-first over references, with a stack of its own: chains of references may be as long as memory allows.
     Result<void> visit_object_of(const Node& node) {
         if (node.kind == Node::Kind::Fold) return {};
-        if (node.kind == Node::Kind::Shape && node.shape.kind < primitive_count()) return {};
+        if (node.kind == Node::Kind::Shape && !is_composite(node.shape)) return {};
         struct Level {
             uint32_t object;
             uint32_t next_node;
@@ -322,6 +324,9 @@ private:
             if (shape_rows()[node.shape.kind].how == KindRow::Formula) {
                 if (auto r = prepare(node.shape); !r) return r;
             }
+            if (shape_rows()[node.shape.kind].how == KindRow::Custom) {
+                if (auto r = check_custom(node.shape); !r) return fail(fault_, where_, r.error().message);
+            }
             box = shape_bounds(node.shape);
         }
         out.stages.clear();
@@ -370,7 +375,7 @@ private:
 
 uint32_t Resolved::object_of(const Node& node) const {
     if (node.kind == Node::Kind::Object) return node.object.index;
-    if (node.kind == Node::Kind::Shape && node.shape.kind >= primitive_count()) {
+    if (node.kind == Node::Kind::Shape && is_composite(node.shape)) {
         return composite_index.at({node.shape.kind, node.shape.params});
     }
     return UINT32_MAX;

@@ -70,6 +70,12 @@ void expect_one_line(const Outcome& o, const std::string& what) {
 constexpr const char* kNoVulkan = "VK_ICD_FILENAMES=/nonexistent VK_DRIVER_FILES=/nonexistent";
 constexpr const char* kBall = "{\"format\": 1, \"edits\": [{\"id\": \"ball\", \"shape\": \"sphere\", \"radius\": 1}]}";
 
+TEST_F(Cli, TheSampleOfAShapeOfItsOwnRuns) {
+    const std::string command = "'" KILN_BINARY_DIR "/bin/sample_custom_shape' > '" + (folder_ / "said").string() + "'";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    EXPECT_EQ(read(folder_ / "said"), "distance at (0, 2, 0): 1.45 m\nof the one in the scene: 0.90 m\n");
+}
+
 TEST_F(Cli, WrongUsageIsTwo) {
     const std::pair<const char*, const char*> cases[] = {
         {"rendr x -o a.png", "did you mean `kiln render`?"},

@@ -15,7 +15,8 @@ TEST(FormulaImage, HasTheBitsOfEveryOperationAtEveryPixel) {
     const auto letters = read_vm(letters_model(60));
     ASSERT_TRUE(letters) << letters.error().message;
     std::vector<Formula> formulas{*letters};
-    for (const char* text : {"1", "-1", "x", "y - 0.2", "length(p.xy) - 0.7", "max(x, -y) + z", "x/y", "sqrt(-1 - x) - 0.5", "min(0.25, max(x, -0.5))", "x/0.001 - x/0.001"}) {
+    for (const char* text : {"1", "-1", "x", "y - 0.2", "length(p.xy) - 0.7", "max(x, -y) + z", "x/y",
+                             "sqrt(-1 - x) - 0.5", "min(0.25, max(x, -0.5))", "x/0.001 - x/0.001"}) {
         formulas.push_back(*parse_formula(text));
     }
     for (uint32_t seed = 0; seed < 60; ++seed) {
@@ -28,7 +29,8 @@ TEST(FormulaImage, HasTheBitsOfEveryOperationAtEveryPixel) {
             const auto slow = formula_image_slow(formulas[i], view, Isa::Scalar);
             for (Isa isa : {Isa::Scalar, Isa::Sse4, Isa::Avx2, Isa::Avx512}) {
                 if (!has_isa(isa)) continue;
-                ASSERT_EQ(formula_image(formulas[i], view, isa), slow) << "formula " << i << " size " << size << " isa " << int(isa);
+                ASSERT_EQ(formula_image(formulas[i], view, isa), slow)
+                    << "formula " << i << " size " << size << " isa " << int(isa);
                 if (size != 100) continue;
                 ASSERT_EQ(formula_image_slow(formulas[i], view, isa), slow) << "formula " << i << " isa " << int(isa);
             }

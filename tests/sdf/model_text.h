@@ -31,13 +31,17 @@ inline std::string letters_model(int glyphs, uint32_t seed = 1) {
         const std::string dx = line("sub " + x + " " + number(cx)), dy = line("sub " + y + " " + number(cy));
         // A ring, cut on one side.
         const std::string r = line("sqrt " + line("add " + line("square " + dx) + " " + line("square " + dy)));
-        const std::string ring = line("max " + line("sub " + r + " " + number(size)) + " " + line("sub " + number(0.7 * size) + " " + r));
+        const std::string ring =
+            line("max " + line("sub " + r + " " + number(size)) + " " + line("sub " + number(0.7 * size) + " " + r));
         const std::string open = line("max " + ring + " " + line("sub " + dx + " " + number(in(0, size))));
         // A bar, turned.
         const double c = std::cos(in(0, 3)), s = std::sqrt(1 - c * c);
-        const std::string u = line("add " + line("mul " + dx + " " + number(c)) + " " + line("mul " + dy + " " + number(s)));
-        const std::string v = line("sub " + line("mul " + dy + " " + number(c)) + " " + line("mul " + dx + " " + number(s)));
-        const std::string bar = line("max " + line("sub " + line("abs " + u) + " " + number(size)) + " " + line("sub " + line("abs " + v) + " " + number(0.15 * size)));
+        const std::string u =
+            line("add " + line("mul " + dx + " " + number(c)) + " " + line("mul " + dy + " " + number(s)));
+        const std::string v =
+            line("sub " + line("mul " + dy + " " + number(c)) + " " + line("mul " + dx + " " + number(s)));
+        const std::string bar = line("max " + line("sub " + line("abs " + u) + " " + number(size)) + " " +
+                                     line("sub " + line("abs " + v) + " " + number(0.15 * size)));
         parts.push_back(line("min " + open + " " + bar));
     }
     while (parts.size() > 1) {
