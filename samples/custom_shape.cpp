@@ -20,7 +20,10 @@ int main() {
                     distance[i] = size - double(parameters[0]) - ridges;
                 }
             },
-        .half_extents = [](const float* parameters) { return kiln::vec3{1, 1, 1} * (1.1f * parameters[0]); },
+        .half_extents =
+            [](const float* parameters) {
+                return kiln::vec3{1, 1, 1} * (1.1f * parameters[0]);
+            },
         .lipschitz = 1.1f,
     });
     if (!pumpkin) return std::fprintf(stderr, "%s\n", pumpkin.error().message.c_str()), 1;

@@ -42,7 +42,8 @@ Registry& registry() {
 
 bool is_name(std::string_view text) {
     if (text.empty() || text.size() > 64 || text[0] < 'a' || text[0] > 'z') return false;
-    return std::all_of(text.begin(), text.end(), [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; });
+    return std::all_of(text.begin(), text.end(),
+                       [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; });
 }
 
 std::string point_text(const double* p) { return formatted("({:.4g}, {:.4g}, {:.4g})", p[0], p[1], p[2]); }
@@ -72,15 +73,18 @@ Result<CustomBounds> sampled(const Shape& shape) {
         const double x[2] = {p[0], q[0]}, y[2] = {p[1], q[1]}, z[2] = {p[2], q[2]};
         double d[2];
         custom_distances(index, shape.params.data(), {x, y, z, 2}, d);
-        if (!std::isfinite(d[0])) return fail(formatted("its distance at {} is not a finite number; make it one everywhere in half_extents", point_text(p)));
+        if (!std::isfinite(d[0]))
+            return fail(formatted("its distance at {} is not a finite number; make it one everywhere in half_extents",
+                                  point_text(p)));
         if (on_surface && d[0] < -1e-4 * size)
-            return fail(formatted("its solid reaches out of half_extents at {}; make half_extents larger", point_text(p)));
+            return fail(
+                formatted("its solid reaches out of half_extents at {}; make half_extents larger", point_text(p)));
         double gap = 0;
         for (int k = 0; k < 3; ++k) gap += (p[k] - q[k]) * (p[k] - q[k]);
         gap = std::sqrt(gap);
         if (std::fabs(d[0] - d[1]) > double(out.lipschitz) * gap * 1.001 + 1e-6 * size)
-            return fail(formatted("lipschitz {:.6g} does not hold: at {} the slope is {:.6g}; use at least that", out.lipschitz, point_text(p),
-                                  std::fabs(d[0] - d[1]) / gap));
+            return fail(formatted("lipschitz {:.6g} does not hold: at {} the slope is {:.6g}; use at least that",
+                                  out.lipschitz, point_text(p), std::fabs(d[0] - d[1]) / gap));
     }
     return out;
 }
@@ -103,7 +107,8 @@ void custom_distances(uint32_t index, const float* params, const CustomShape::Po
     }
 }
 
-void custom_points(uint32_t index, const float* params, const double* x, const double* y, const double* z, int count, double* out) {
+void custom_points(uint32_t index, const float* params, const double* x, const double* y, const double* z, int count,
+                   double* out) {
     custom_distances(index, params, {x, y, z, count}, out);
 }
 
@@ -128,7 +133,9 @@ namespace kiln {
 
 Result<Shape> register_shape(CustomShape shape) {
     using namespace sdf;
-    const auto fail = [&](std::string what) { return Error{"register shape \"" + shape.name + "\": " + std::move(what), ErrorKind::Usage}; };
+    const auto fail = [&](std::string what) {
+        return Error{"register shape \"" + shape.name + "\": " + std::move(what), ErrorKind::Usage};
+    };
     if (!is_name(shape.name)) return fail("no name; use lower case letters, digits and _, a letter first");
     if (!shape.distance) return fail("no distance; give it a function");
     if (!shape.half_extents) return fail("no half_extents; give it a function");
@@ -140,10 +147,13 @@ Result<Shape> register_shape(CustomShape shape) {
     Shape out;
     for (size_t i = 0; i < shape.parameters.size(); ++i) {
         const CustomShape::Parameter& p = shape.parameters[i];
-        if (!is_name(p.name)) return fail("a parameter without a name; use lower case letters, digits and _, a letter first");
+        if (!is_name(p.name))
+            return fail("a parameter without a name; use lower case letters, digits and _, a letter first");
         for (size_t k = 0; k < i; ++k)
-            if (shape.parameters[k].name == p.name) return fail("two parameters \"" + p.name + "\"; give them different names");
-        if (!(p.value >= p.least && p.value <= p.most)) return fail("the value of \"" + p.name + "\" is out of its range");
+            if (shape.parameters[k].name == p.name)
+                return fail("two parameters \"" + p.name + "\"; give them different names");
+        if (!(p.value >= p.least && p.value <= p.most))
+            return fail("the value of \"" + p.name + "\" is out of its range");
         out.params[i] = p.value;
         made->ranges.push_back(formatted("[{}, {}]", p.least, p.most));
     }
@@ -155,9 +165,12 @@ Result<Shape> register_shape(CustomShape shape) {
     const size_t count = all.count.load(std::memory_order_relaxed);
     const std::span<const KindRow> before = shape_rows();
     for (const KindRow& other : before)
-        if (other.name == kept.name) return Error{"register shape \"" + kept.name + "\": there is a shape of this name; choose another", ErrorKind::Usage};
+        if (other.name == kept.name)
+            return Error{"register shape \"" + kept.name + "\": there is a shape of this name; choose another",
+                         ErrorKind::Usage};
     if (count == size_t(kMostCustomShapes) || before.size() == kMostRows)
-        return Error{formatted("register shape \"{}\": {} are registered; no more fit", kept.name, count), ErrorKind::Usage};
+        return Error{formatted("register shape \"{}\": {} are registered; no more fit", kept.name, count),
+                     ErrorKind::Usage};
     if (count == 0) {
         all.built_in = before.size();
         std::copy(before.begin(), before.end(), all.rows.begin());

@@ -158,6 +158,16 @@ private:
     std::unordered_map<uint32_t, uint32_t> numbers_;
 };
 
+using Numbers = std::array<float, 4>;
+using Look = std::pair<std::string_view, Numbers>;
+// Compares what is kept with what is asked, without a copy of its text.
+struct Less {
+    using is_transparent = void;
+    static Look of(const std::pair<std::string, Numbers>& key) { return {key.first, key.second}; }
+    static Look of(const Look& key) { return key; }
+    bool operator()(const auto& a, const auto& b) const { return of(a) < of(b); }
+};
+
 using Prepared = Result<std::shared_ptr<const PreparedFormula>>;
 
 Prepared prepare(const std::string& data, vec3 half_extents, float declared) {
@@ -178,16 +188,11 @@ FormulaCode formula_code(const Formula& formula, uint32_t most_registers) {
 }
 
 Prepared prepare_formula(const std::string& data, vec3 half_extents, float declared) {
-    struct Key {
-        std::string data;
-        std::array<float, 4> numbers;
-        auto operator<=>(const Key&) const = default;
-    };
     // Enough for a scene's; a world with more distinct formulas than this prepares some again.
     constexpr size_t kMostKept = 1024;
     static std::mutex mutex;
-    static std::map<Key, Prepared> kept;
-    Key key{data, {half_extents.x, half_extents.y, half_extents.z, declared}};
+    static std::map<std::pair<std::string, Numbers>, Prepared, Less> kept;
+    const Look key{data, {half_extents.x, half_extents.y, half_extents.z, declared}};
     {
         const std::lock_guard lock(mutex);
         if (const auto found = kept.find(key); found != kept.end()) return found->second;
@@ -195,7 +200,7 @@ Prepared prepare_formula(const std::string& data, vec3 half_extents, float decla
     Prepared made = prepare(data, half_extents, declared);
     const std::lock_guard lock(mutex);
     if (kept.size() >= kMostKept) kept.clear();
-    return kept.emplace(std::move(key), std::move(made)).first->second;
+    return kept.emplace(std::pair(data, key.second), std::move(made)).first->second;
 }
 
 }  // namespace kiln::sdf

@@ -283,7 +283,7 @@ private:
     }
 
     Result<void> prepare(const Shape& shape) {
-        auto& slot = out_.formulas[std::pair(shape.data, shape.params)];
+        auto& slot = out_.formulas[std::pair(std::string_view(shape.data), shape.params)];
         if (slot) return {};
         const float* p = shape.params.data();  // lipschitz, half_extents
         auto made = prepare_formula(shape.data, {p[1], p[2], p[3]}, p[0]);
@@ -400,7 +400,7 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
 }
 
 const PreparedFormula& Resolved::formula_of(const Shape& shape) const {
-    return *formulas.at(std::pair(shape.data, shape.params));
+    return *formulas.at(std::pair(std::string_view(shape.data), shape.params));
 }
 
 EntryFactor entry_factor(const Warp& warp, const Box3& solid_after) {

@@ -28,9 +28,13 @@ Shape ball_of_our_own() {
                                     .distance =
                                         [](const CustomShape::Points& p, const float* w, double* d) {
                                             for (int i = 0; i < p.count; ++i)
-                                                d[i] = std::sqrt(p.x[i] * p.x[i] + p.y[i] * p.y[i] + p.z[i] * p.z[i]) - double(w[0]);
+                                                d[i] = std::sqrt(p.x[i] * p.x[i] + p.y[i] * p.y[i] + p.z[i] * p.z[i]) -
+                                                       double(w[0]);
                                         },
-                                    .half_extents = [](const float* w) { return vec3{1, 1, 1} * (1.5f * w[0]); }});
+                                    .half_extents =
+                                        [](const float* w) {
+                                            return vec3{1, 1, 1} * (1.5f * w[0]);
+                                        }});
         EXPECT_TRUE(made) << made.error().message;
         return *made;
     }();
@@ -144,11 +148,14 @@ TEST(Custom, WhatItSaysOfItselfIsChecked) {
     };
     const auto box = [](float half) { return [half](const float*) { return vec3{half, half, half}; }; };
     expect_refused("test_steep", {.distance = sphere(1.2), .half_extents = box(1)}, "lipschitz 1 does not hold: at (");
-    expect_refused("test_large", {.distance = sphere(1), .half_extents = box(0.4f)}, "reaches out of half_extents at (");
+    expect_refused("test_large", {.distance = sphere(1), .half_extents = box(0.4f)},
+                   "reaches out of half_extents at (");
     expect_refused("test_flat", {.distance = sphere(1), .half_extents = box(0)}, "half_extents gives no size");
-    expect_refused("test_throws",
-                   {.distance = [](const CustomShape::Points&, const float*, double*) { throw std::runtime_error("no"); }, .half_extents = box(1)},
-                   "not a finite number");
+    expect_refused(
+        "test_throws",
+        {.distance = [](const CustomShape::Points&, const float*, double*) { throw std::runtime_error("no"); },
+         .half_extents = box(1)},
+        "not a finite number");
     expect_refused("test_jump",
                    {.distance =
                         [](const CustomShape::Points& p, const float*, double* d) {
@@ -172,8 +179,14 @@ TEST(Custom, RegistrationsThatCannotBeAreRefused) {
     refused({.name = "test_none", .half_extents = half}, "no distance");
     refused({.name = "test_none", .distance = distance}, "no half_extents");
     refused({.name = "test_none", .distance = distance, .half_extents = half, .lipschitz = 0}, "lipschitz");
-    refused({.name = "test_none", .parameters = {{.name = "a"}, {.name = "a"}}, .distance = distance, .half_extents = half}, "two parameters");
-    refused({.name = "test_none", .parameters = {{.name = "a", .value = 2, .most = 1}}, .distance = distance, .half_extents = half}, "out of its range");
+    refused(
+        {.name = "test_none", .parameters = {{.name = "a"}, {.name = "a"}}, .distance = distance, .half_extents = half},
+        "two parameters");
+    refused({.name = "test_none",
+             .parameters = {{.name = "a", .value = 2, .most = 1}},
+             .distance = distance,
+             .half_extents = half},
+            "out of its range");
     (void)ball_of_our_own();
     refused({.name = "test_ball", .distance = distance, .half_extents = half}, "there is a shape of this name");
 }
