@@ -85,21 +85,34 @@ void settle(Slope& s) {
 
 Slope unknown() { return {kAll, {kAll, kAll, kAll}, kInf}; }
 
-// |J v| for a matrix whose rows are the gradients of several values: at most sqrt(|J|_1 |J|_inf).
+// |J v| for a matrix whose rows are the gradients of several values: at most sqrt(|J|_1 |J|_inf), sqrt(|J J'|_inf), and the root of the
+// sum of squares.
 double stretch_of(const std::vector<const Slope*>& rows) {
-    double row_most = 0, column[3] = {0, 0, 0}, frobenius = 0;
+    double row_most = 0, column[3] = {0, 0, 0}, squares = 0, products_most = 0;
     for (const Slope* row : rows) {
-        double sum = 0;
+        double sum = 0, products = 0;
         for (size_t axis = 0; axis < 3; ++axis) {
             const double g = row->gradient[axis].most();
             sum += g;
             column[axis] += g;
         }
+        for (const Slope* other : rows) {
+            double product = 0;
+            for (size_t axis = 0; axis < 3; ++axis) {
+                const double g = row->gradient[axis].most(), h = other->gradient[axis].most();
+                if (g != 0 && h != 0) product += g * h;
+            }
+            products += std::min(product, row->length * other->length);
+        }
         row_most = std::max(row_most, sum);
-        frobenius += row->length * row->length;
+        squares += row->length * row->length;
+        products_most = std::max(products_most, products);
     }
-    const double by_norms = std::sqrt(row_most * std::max({column[0], column[1], column[2]}));
-    return std::isnan(by_norms) ? std::sqrt(frobenius) : std::min(by_norms, std::sqrt(frobenius));
+    const double bounds[3] = {row_most * std::max({column[0], column[1], column[2]}), products_most, squares};
+    double least = kInf;
+    for (const double b : bounds)
+        if (b < least) least = b;  // NaN says nothing
+    return std::sqrt(least);
 }
 
 class Slopes {
@@ -274,6 +287,13 @@ private:
         std::vector<const Slope*> rows;
         for (uint32_t n : roots_[i]) rows.push_back(&slopes_[n]);
         out.length = std::min(out.length, stretch_of(rows));
+        // Along an axis a length grows no faster than its operands do together.
+        for (size_t k = 0; k < 3; ++k) {
+            double squares = 0;
+            for (const Slope* row : rows) squares += row->gradient[k].most() * row->gradient[k].most();
+            const double most = std::sqrt(squares);
+            if (most < kInf) out.gradient[k] = meet(out.gradient[k], {-most, most});
+        }
         return out;
     }
 

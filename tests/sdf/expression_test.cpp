@@ -349,7 +349,8 @@ TEST(FormulaLipschitz, IsNearlyTheLargestSlope) {
     for (const Case& c :
          {Case{"length(p) - 1", 1}, Case{"x", 1}, Case{"3*x - 4*z", 5}, Case{"length(p) - 1 - 0.1*sin(8*x)", 1.8},
           Case{"x^2", 2}, Case{"max(length(p.xz) - 0.5, abs(y) - 0.3)", 1}, Case{"sqrt(0.01 + x*x + y*y)", 1},
-          Case{"2", 1}, Case{"length(max(abs(p) - 0.3, 0))", 1}}) {
+          Case{"2", 1}, Case{"length(vec2(length(p.xz) - 0.6, y)) - 0.2", 1},
+          Case{"length(max(abs(p) - 0.3, 0))", 1}}) {
         const auto slope = formula_lipschitz(parsed(c.text), {1, 1, 1}, 0);
         ASSERT_TRUE(slope) << c.text << ": " << slope.error().message;
         EXPECT_GE(double(*slope), c.slope * 0.99) << c.text;
