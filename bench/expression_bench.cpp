@@ -17,7 +17,7 @@ namespace {
 
 const Formula& model() {
     static const Formula formula = [] {
-        std::string text = letters_model(247);
+        std::string text = letters_model(335);
         if (const char* path = std::getenv("KILN_MODEL")) {
             std::ifstream in(path);
             std::ostringstream all;
@@ -57,7 +57,7 @@ void BM_model_picture_brute_force(benchmark::State& state) {
 }
 
 void BM_model_read(benchmark::State& state) {
-    const std::string text = letters_model(247);
+    const std::string text = letters_model(335);
     for (auto _ : state) benchmark::DoNotOptimize(read_vm(text));
 }
 

@@ -34,6 +34,7 @@ std::vector<std::string> seeds() {
 "objects":{"washer":{"op":"subtract","blend_radius":0.01,"children":[{"shape":"cylinder","half_height":0.05,"radius":0.4},{"object":"other","position":[0,1,0]}]},
 "other":{"shape":"box","domain":[{"warp":"mirror","axis":"x"},{"warp":"repeat","spacing":[2,0,2],"count":[3,1,3]}]}},
 "edits":[{"id":"ground","shape":"plane","material":"clay"},{"id":"l\u00e9","shape":"sphere","radius":0.5,"op":"paint","material":"clay","rotation":[0,0,0,1],"scale":[1,2,1]},
+{"id":"f","shape":"expression","expression":"length(p)-1","lipschitz":1,"half_extents":[1,1,1]},{"shape":"expression","file":"a.vm"},
 {"id":"w1","object":"washer","dynamic":true,"outline":{"color":[1,0,0],"width_px":2}}],
 "meshes":[{"id":"engine","file":"engine.glb"}],"lights":[{"type":"spot","position":[0,3,0],"direction":[0,-1,0],"inner_deg":15,"outer_deg":25}],
 "environment":{"color":[0.5,0.6,0.8],"file":"sky.exr"},"cameras":{"main":{"position":[3,2,4],"target":[0,0.5,0],"tone_map":"aces"}},
