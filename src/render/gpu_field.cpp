@@ -334,10 +334,7 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
         return {};
     }
     // Bricks whose code the GPU cannot run are the CPU's.
-    const auto gpu_can = [&](uint32_t slot) {
-        const field::BrickRecord& record = next->records()[slot];
-        return !any_cpu_only(next->code().subspan(record.code_first, record.code_count));
-    };
+    const auto gpu_can = [&](uint32_t slot) { return !any_cpu_only(next->code_of(slot)); };
     const auto host = std::stable_partition(slots.begin(), slots.end(), gpu_can);
     const std::span<const uint32_t> for_gpu(slots.begin(), host), for_host(host, slots.end());
     if (auto r = bake(for_gpu); !r) return fail(r.error());

@@ -82,10 +82,7 @@ double length_of(const Box3& box) { return double(length(box.max - box.min)); }
 uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> code, dvec3 p) {
     constexpr size_t kMost = 3 + 2 * size_t(kMaxParams);
     constexpr size_t kEditWord = 2;  // of a Shape's numbers: scale, material, edit
-    const auto has_edit = [](const sdf::Instruction& i) {
-        return i.opcode() == sdf::Opcode::Shape || i.opcode() == sdf::Opcode::Constant ||
-               i.opcode() == sdf::Opcode::Result || i.opcode() == sdf::Opcode::Custom;
-    };
+    const auto has_edit = [](const sdf::Instruction& i) { return i.has_material(); };
     std::vector<uint32_t> edits;
     for (const sdf::Instruction& i : code)
         if (has_edit(i)) edits.push_back(uint32_t(program.params[i.param + kEditWord]));

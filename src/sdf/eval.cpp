@@ -126,8 +126,8 @@ void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, cons
 }
 
 float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out, Isa isa) {
-    return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z,
-                                            out, memory_of(tape.memory_slots, kChunkBytes));
+    return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z, out,
+                                            memory_of(tape.memory_slots, kChunkBytes));
 }
 
 void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes, Isa isa) {

@@ -81,6 +81,11 @@ struct Instruction {
     constexpr uint32_t dst() const { return (word >> 13) & 31u; }
     constexpr uint32_t a() const { return (word >> 18) & 31u; }
     constexpr uint32_t b() const { return (word >> 23) & 31u; }
+    /// Makes a value with a material and an edit's number: param + 1, param + 2.
+    constexpr bool has_material() const {
+        return opcode() == Opcode::Shape || opcode() == Opcode::Constant || opcode() == Opcode::Result ||
+               opcode() == Opcode::Custom;
+    }
     /// Has no twin on the GPU: a formula's values in memory, a program's own shape.
     constexpr bool cpu_only() const {
         if (opcode() == Opcode::Custom) return true;
@@ -129,7 +134,7 @@ public:
     std::vector<GridPlace> grids;
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
-    bool unbounded = false;  ///< some visible union edit has infinite bounds
+    bool unbounded = false;     ///< some visible union edit has infinite bounds
     uint32_t memory_slots = 0;  ///< values that formulas keep outside the registers at once; the GPU has none
 
     /// Rows of the visible edits, in order.

@@ -107,7 +107,7 @@ TEST(Custom, EveryInstructionSetGivesTheSameBytesAlsoPruned) {
     size_t shorter = 0;
     for (size_t i = 0; i < x.size(); ++i) {
         prune(view(*program), {x[i], y[i], z[i]}, 0.05f, code, scratch);
-        shorter += code.size() < program->code.size();
+        shorter += code.size() < program->tape().size();
         float d = 0;
         evaluate(view(*program, code), Points{&x[i], &y[i], &z[i], 1}, &d);
         ASSERT_EQ(d, one[i]);
