@@ -93,7 +93,7 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
     return out;
 }
 
-aBrickMaterials BrickEvaluator::materials() const {
+BrickMaterials BrickEvaluator::materials() const {
     constexpr size_t kTexels = size_t(kBrickTexelCount);
     thread_local std::vector<float> points(3 * kTexels), values(kTexels);
     thread_local std::vector<sdf::MaterialMix> mixes(kTexels);

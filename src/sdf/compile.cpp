@@ -393,12 +393,15 @@ private:
         leaf.aux = shape.kind;
         leaf.chain = flush(task.chain, task.pending);
         leaf.param = add_params({float(task.scale), float(task.material), float(row_)}, params);
-        leaf.lacks_material = task.material == kNoMaterial;
-        if (!leaf.lacks_material) {
-            const bool first = material_ == kNoMaterial;
-            material_ = first || material_ == task.material ? uint16_t(task.material) : kSeveralMaterials;
-        }
+        add_material(task, leaf);
         add_node(task, leaf);
+    }
+
+    void add_material(const Task& task, Binary& leaf) {
+        leaf.lacks_material = task.material == kNoMaterial;
+        if (leaf.lacks_material) return;
+        const bool first = material_ == kNoMaterial;
+        material_ = first || material_ == task.material ? uint16_t(task.material) : kSeveralMaterials;
     }
 
     // The bounded leaf of architecture §4 without a margin: the point is held in the box, where the slope's bound is proven, so
@@ -416,7 +419,7 @@ private:
         leaf.chain = add_step(chain, Opcode::PointClamp, 0,
                               add_params({box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}));
         leaf.param = add_params({float(task.scale / double(lipschitz)), float(task.material), float(row_)}, params);
-        leaf.lacks_material = task.material == kNoMaterial;
+        add_material(task, leaf);
         add_node(task, leaf);
     }
 

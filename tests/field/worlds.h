@@ -175,6 +175,7 @@ inline World formulas() {
         edit(Expression{.expression = "s = 7; max(abs(dot(sin(s*p), cos(s*p.yzx))/s) - 0.04, length(p) - 0.5)",
                         .half_extents = {0.6f, 0.6f, 0.6f}},
              {0.6f, 0.5f, 0}, Op::Union, 0.05f));
+    w.edits.back().node.material = MaterialId{2, 0};
     std::string drops = "1";
     for (int i = 0; i < 24; ++i)
         drops = "min(" + drops + ", length(p - vec3(" + std::to_string(0.06 * i - 0.7) + ", " +
