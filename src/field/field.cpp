@@ -419,7 +419,7 @@ private:
     bool uses_removed(uint32_t slot) const {
         if (removed_.empty()) return false;
         for (const sdf::Instruction in : old_->code_of(slot)) {
-            if (in.opcode() != sdf::Opcode::Shape && in.opcode() != sdf::Opcode::Constant) continue;
+            if (!in.has_material()) continue;
             const uint32_t row = uint32_t(program_->params[in.param + 2]);
             if (std::find(removed_.begin(), removed_.end(), row) != removed_.end()) return true;
         }

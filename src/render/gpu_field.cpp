@@ -31,6 +31,10 @@ std::span<const std::byte> bytes_of(const T& range) {
     return std::as_bytes(std::span(range));
 }
 
+bool any_cpu_only(std::span<const sdf::Instruction> code) {
+    return std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); });
+}
+
 uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
 
 }  // namespace
@@ -182,22 +186,22 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
     }
     using rhi::TextureUsage;
     const rhi::Extent size{bricks_x_ * 8, bricks_y_ * 8, bricks_z_ * 8};
-    auto distances =
-        device_->create_texture({.dimension = rhi::Dimension::D3,
-                                 .format = format,
-                                 .size = size,
-                                 .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
-                                          (baker == Baker::Storage ? TextureUsage::Storage : TextureUsage::CopyDst),
-                                 .label = "atlas distances"});
+    auto distances = device_->create_texture(
+        {.dimension = rhi::Dimension::D3,
+         .format = format,
+         .size = size,
+         .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
+                  (baker == Baker::Storage ? TextureUsage::Storage | TextureUsage::CopyDst : TextureUsage::CopyDst),
+         .label = "atlas distances"});
     if (!distances) return distances.error();
     distances_ = *distances;
-    auto materials =
-        device_->create_texture({.dimension = rhi::Dimension::D3,
-                                 .format = rhi::Format::R32Uint,
-                                 .size = {size.width / 2, size.height, size.depth},
-                                 .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
-                                          (baker == Baker::Host ? TextureUsage::CopyDst : TextureUsage::Storage),
-                                 .label = "atlas materials"});
+    auto materials = device_->create_texture(
+        {.dimension = rhi::Dimension::D3,
+         .format = rhi::Format::R32Uint,
+         .size = {size.width / 2, size.height, size.depth},
+         .usage = TextureUsage::Sampled | TextureUsage::CopySrc |
+                  (baker == Baker::Host ? TextureUsage::CopyDst : TextureUsage::Storage | TextureUsage::CopyDst),
+         .label = "atlas materials"});
     if (!materials) return materials.error();
     materials_ = *materials;
     auto palettes = device_->create_buffer(
@@ -223,7 +227,16 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
         const sdf::EditSpan& edit = program.edits[row];
         adds = adds || edit.op == Op::Union;
         const auto code = program.code.subspan(edit.first, edit.count);
-        out.insert(out.end(), code.begin(), code.end());
+        for (sdf::Instruction in : code) {
+            // What the GPU cannot run stands as solid: its box is cut by the instruction that follows. Where such a shape intersects, the
+            // rays of the grid's outside see the box.
+            if (any_cpu_only(code)) {
+                if (in.opcode() == sdf::Opcode::Arithmetic) continue;
+                if (in.opcode() == sdf::Opcode::Result || in.opcode() == sdf::Opcode::Custom)
+                    in = sdf::Instruction::make(sdf::Opcode::Constant, 0, in.dst(), 0, 0, in.param);
+            }
+            out.push_back(in);
+        }
         if (edit.op == Op::Paint) continue;         // changes no distance
         concave = concave && edit.op == Op::Union;  // the smooth minimum of concave functions is concave
         for (const sdf::Instruction in : code) {
@@ -315,7 +328,27 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
         slots = next->slots();
     }
     std::sort(slots.begin(), slots.end());
-    if (auto r = baker == Baker::Host ? bake_on_host(slots) : bake(slots); !r) return fail(r.error());
+    bricks_on_host_ = 0;
+    if (baker == Baker::Host) {
+        if (auto r = bake_on_host(slots); !r) return fail(r.error());
+        return {};
+    }
+    // Bricks whose code the GPU cannot run are the CPU's.
+    const auto gpu_can = [&](uint32_t slot) { return !any_cpu_only(next->code_of(slot)); };
+    const auto host = std::stable_partition(slots.begin(), slots.end(), gpu_can);
+    const std::span<const uint32_t> for_gpu(slots.begin(), host), for_host(host, slots.end());
+    if (auto r = bake(for_gpu); !r) return fail(r.error());
+    if (!for_host.empty()) {
+        const double gpu_ms = bake_ms_;
+        if (auto r = bake_on_host(for_host); !r) return fail(r.error());
+        bake_ms_ += gpu_ms;
+        log::info(
+            "{} of {} bricks were baked on the CPU: shapes of the program's own, or formulas with more values than the "
+            "GPU has registers",
+            for_host.size(), slots.size());
+    }
+    bricks_baked_ = uint32_t(slots.size());
+    bricks_on_host_ = uint32_t(for_host.size());
     return {};
 }
 

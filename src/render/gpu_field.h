@@ -53,6 +53,9 @@ public:
     uint32_t program_count() const { return program_count_; }
     uint64_t atlas_bytes() const;
     uint32_t bricks_baked() const { return bricks_baked_; }  // by the last update()
+    uint32_t bricks_on_host() const {
+        return bricks_on_host_;
+    }  // … of them on the CPU because their code has no twin on the GPU
     double bake_ms() const {
         return bake_ms_;
     }                                      // GPU time of the last update() (Host: wall time); 0: nothing was baked
@@ -104,7 +107,7 @@ private:
     bool outside_is_concave_ = false;
     TapeUse use_, outside_use_;
     bool specialised_once_ = false;  // use_ only ever grows from there
-    uint32_t bricks_baked_ = 0;
+    uint32_t bricks_baked_ = 0, bricks_on_host_ = 0;
     double bake_ms_ = 0;
 };
 

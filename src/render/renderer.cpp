@@ -197,6 +197,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
+    if (settings.analytic) {
+        const std::span<const sdf::Instruction> code = frame.field->program().tape();
+        if (std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); }))
+            return Error{
+                "analytic: the GPU cannot run this world's program (a shape of the program's own, or a formula with "
+                "more values than "
+                "it has registers); draw it from bricks",
+                ErrorKind::Usage};
+    }
     if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated)
         return updated.error();
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)

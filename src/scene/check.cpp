@@ -5,6 +5,8 @@
 
 #include "scene/format.h"
 
+#include "sdf/expression_code.h"
+
 #include "base/format.h"
 
 #include <cmath>
@@ -62,6 +64,8 @@ Fault check_node(const Node& node, size_t objects, size_t materials) {
         if (auto f = check_params(row, node.shape.params)) return f;
         if (row.how == sdf::KindRow::Sampled && node.shape.data.empty())
             return fault(formatted("shape: a {} needs a file in `data`", row.name));
+        if (row.how == sdf::KindRow::Formula && node.shape.data.starts_with(sdf::kModelText))
+            return fault("shape: an expression holds its formula or the name of a model, \"file:NAME.vm\"");
     } else if (node.kind == Node::Kind::Object && node.object.index >= objects) {
         return fault("object: there is no such object; add it first");
     }

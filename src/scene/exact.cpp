@@ -58,9 +58,7 @@ double length_of(const Box3& box) { return double(length(box.max - box.min)); }
 uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> code, dvec3 p) {
     constexpr size_t kMost = 3 + 2 * size_t(kMaxParams);
     constexpr size_t kEditWord = 2;  // of a Shape's numbers: scale, material, edit
-    const auto has_edit = [](const sdf::Instruction& i) {
-        return i.opcode() == sdf::Opcode::Shape || i.opcode() == sdf::Opcode::Constant;
-    };
+    const auto has_edit = [](const sdf::Instruction& i) { return i.has_material(); };
     std::vector<uint32_t> edits;
     for (const sdf::Instruction& i : code)
         if (has_edit(i)) edits.push_back(uint32_t(program.params[i.param + kEditWord]));
@@ -85,7 +83,8 @@ uint32_t edit_at(const sdf::Program& program, std::span<const sdf::Instruction> 
         i.param = uint32_t(at);
     }
     sdf::MaterialMix mix;
-    (void)sdf::evaluate(sdf::TapeView{copy, params.data(), program.samples.data()}, p, &mix, true);
+    (void)sdf::evaluate(sdf::TapeView{copy, params.data(), program.samples.data(), program.memory_slots}, p, &mix,
+                        true);
     uint32_t rank = mix.id0;
     if (mix.weight >= 0.5f && mix.id1 != uint16_t(sdf::kNoMaterial)) rank = std::max<uint32_t>(mix.id0, mix.id1);
     if (rank >= edits.size()) return UINT32_MAX;

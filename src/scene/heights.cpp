@@ -2,19 +2,39 @@
 
 #include "scene/heights.h"
 
+#include "sdf/expression_code.h"
 #include "sdf/tables.h"
 
 #include <kiln/shapes.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
 
 namespace kiln::scene {
 
 namespace {
 
 bool has_file(const Node& node) {
-    return node.kind == Node::Kind::Shape && node.shape.kind < sdf::shape_rows().size() &&
-           sdf::shape_rows()[node.shape.kind].how == sdf::KindRow::Sampled;
+    if (node.kind != Node::Kind::Shape || node.shape.kind >= sdf::shape_rows().size()) return false;
+    const sdf::KindRow::How how = sdf::shape_rows()[node.shape.kind].how;
+    return how == sdf::KindRow::Sampled ||
+           (how == sdf::KindRow::Formula && node.shape.data.starts_with(sdf::kModelFile));
+}
+
+Result<std::string> read_model(const std::string& path) {
+    constexpr std::uintmax_t kMostBytes = std::uintmax_t(16) << 20;
+    std::error_code error;
+    const std::uintmax_t bytes = std::filesystem::file_size(path, error);
+    std::ifstream in(path, std::ios::binary);
+    if (error || !in) return Error{path + ": cannot be read; check the name", ErrorKind::Input};
+    if (bytes > kMostBytes) return Error{path + ": longer than 16 MiB; use a smaller model", ErrorKind::Input};
+    std::string text(size_t(bytes), '\0');
+    in.read(text.data(), std::streamsize(text.size()));
+    if (!in) return Error{path + ": cannot be read to its end", ErrorKind::Input};
+    return text;
 }
 
 // The numbers of a mesh shape by their names.
@@ -84,6 +104,20 @@ Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Obj
                 return index.error();
             }
             node.shape.data = std::to_string(*index);
+            return {};
+        }
+        if (node.shape.data.starts_with(sdf::kModelFile)) {
+            const std::string name = node.shape.data.substr(sdf::kModelFile.size());
+            auto model = grids.models.find(name);
+            if (model == grids.models.end()) {
+                auto text = read_model(in_folder(folder, name));
+                if (!text) {
+                    if (fault) *fault = where;
+                    return text.error();
+                }
+                model = grids.models.emplace(name, std::move(*text)).first;
+            }
+            node.shape.data = std::string(sdf::kModelText) + model->second;
             return {};
         }
         auto found = grids.by_file.find(node.shape.data);

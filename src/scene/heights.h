@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Files of sampled shapes, height images and meshes: loaded once each, and named by number in what the compiler reads.
+// Files of shapes, loaded once each: height images and meshes, named by number in what the compiler reads, and models, whose text takes
+// the name's place.
 #pragma once
 
 #include "model/bake.h"
@@ -25,6 +26,7 @@ struct Grids {
     std::vector<sdf::MeshGrid> meshes;
     std::vector<MeshNote> mesh_notes;
     std::map<std::pair<std::string, int>, uint32_t> by_mesh;  ///< file and resolution
+    std::map<std::string, std::string> models;                ///< text by file name
 };
 
 /// What stands in "file" of a sampled shape: an example and what it is.

@@ -5,6 +5,8 @@
 #include "scene/heights.h"
 #include "scene/suggest.h"
 
+#include "sdf/expression_code.h"
+
 #include "base/format.h"
 
 #include <unordered_set>
@@ -54,7 +56,8 @@ bool NodeReader::unknown_node_key(JsonIndex member, const Table& table, const No
         const sdf::KindRow& row = sdf::shape_rows()[node.shape.kind];
         for (const sdf::FieldRow& field : row.fields())
             if (field.range != "internal") known.push_back(field.name);
-        if (row.how == sdf::KindRow::Sampled) known.push_back("file");
+        if (row.how == sdf::KindRow::Sampled || row.how == sdf::KindRow::Formula) known.push_back("file");
+        if (row.how == sdf::KindRow::Formula) known.push_back("expression");
         // A size of another shape: say what this one has.
         const std::string_view key = in_.doc.key(member);
         if (nearest_word(key, known).empty() && !find_row(table, key)) {
@@ -75,13 +78,7 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     if (!in_.text(name, "sphere", nullptr)) return false;
     const std::string_view word = in_.doc.text(name);
     const auto kind = sdf::shape_kind(word);
-    if (!kind) {
-        if (word == "expression")
-            return in_.fail(
-                name,
-                formatted("this version does not have the shape \"{}\" yet; use one of `kiln schema`'s shapes", word));
-        return in_.unknown_name(name, "shape", names_of(sdf::shape_rows()));
-    }
+    if (!kind) return in_.unknown_name(name, "shape", names_of(sdf::shape_rows()));
     out.kind = Node::Kind::Shape;
     out.shape.kind = *kind;
     const sdf::KindRow& row = sdf::shape_rows()[*kind];
@@ -89,6 +86,14 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     if (row.how == sdf::KindRow::Sampled && !in_.doc.find(at, "file"))
         return in_.fail(at, formatted("a {} needs a \"file\"; name {}, relative to the scene file", row.name,
                                       resource_of(*kind).what));
+    if (row.how == sdf::KindRow::Formula) {
+        const auto text = in_.doc.find(at, "expression"), file = in_.doc.find(at, "file");
+        if (!text && !file)
+            return in_.fail(
+                at,
+                "an expression needs its formula; add \"expression\": \"length(p) - 1\", or \"file\" with a .vm model");
+        if (text && file) return in_.fail_at_key(*file, "\"expression\" and \"file\" in one place; keep one of them");
+    }
     return true;
 }
 
@@ -161,6 +166,14 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         if (shape_row) {
             if (const sdf::FieldRow* field = find_field(*shape_row, key)) {
                 if (!in_.numbers(m, *field, out.shape.params.data() + field->offset)) return false;
+                continue;
+            }
+            if (shape_row->how == sdf::KindRow::Formula && (key == "expression" || key == "file")) {
+                const bool file = key == "file";
+                if (!in_.text(m, file ? "model.vm" : "length(p) - 1", &out.shape.data)) return false;
+                if (file && !out.shape.data.ends_with(".vm"))
+                    return in_.fail(m, "not the name of a .vm model; name one, relative to the scene file");
+                if (file) out.shape.data = std::string(sdf::kModelFile) + out.shape.data;
                 continue;
             }
             if (key == "file" && shape_row->how == sdf::KindRow::Sampled) {

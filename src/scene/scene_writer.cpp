@@ -6,6 +6,8 @@
 
 #include "scene/format.h"
 
+#include "sdf/expression_code.h"
+
 #include <cstring>
 #include <unordered_map>
 
@@ -194,6 +196,10 @@ private:
         out_.close();
     }
 
+    static bool is_formula(const Node& node) {
+        return node.kind == Node::Kind::Shape && sdf::shape_rows()[node.shape.kind].how == sdf::KindRow::Formula;
+    }
+
     // Keys of an edit (edit given) or of a tree node.
     Members node_members(const Node& node, const Edit* edit, JsonIndex at) const {
         std::vector<std::string_view> keys;
@@ -203,6 +209,7 @@ private:
         if (node.kind == Node::Kind::Shape) {
             for (const sdf::FieldRow& f : sdf::shape_rows()[node.shape.kind].fields()) keys.push_back(f.name);
             keys.push_back("file");
+            if (is_formula(node)) keys.push_back("expression");
         }
         for (const char* key :
              {"op", "blend_radius", "material_blend_radius", "position", "rotation", "scale", "domain", "material"})
@@ -258,6 +265,11 @@ private:
             return out_.add_text(sdf::shape_rows()[node.shape.kind].name, key);
         if (key == "object" && node.kind == Node::Kind::Object)
             return out_.add_text(scene_.objects[node.object.index].name, key);
+        if (is_formula(node) && (key == "file" || key == "expression")) {
+            const bool file = node.shape.data.starts_with(sdf::kModelFile);
+            if (file != (key == "file")) return;
+            return out_.add_text(std::string_view(node.shape.data).substr(file ? sdf::kModelFile.size() : 0), key);
+        }
         if (key == "file" && node.kind == Node::Kind::Shape && !node.shape.data.empty())
             return out_.add_text(node.shape.data, key);
         if (key == "op" && folds) return text(key, at, kOpNames[size_t(edit ? edit->op : node.op)], "union");

@@ -212,6 +212,11 @@ Json nodes_of(const Table& table) {
                                     ", relative to the scene file"}};
             required.push_back("file");
         }
+        if (row.how == sdf::KindRow::Formula) {
+            properties["expression"] = {{"type", "string"}, {"description", "the formula; or `file`"}};
+            properties["file"] = {{"type", "string"},
+                                  {"description", ".vm model, relative to the scene file; or `expression`"}};
+        }
         properties.update(common(false));
         add(row.doc, std::move(properties), std::move(required));
     }

@@ -81,6 +81,8 @@ Result<void> World::Impl::compile_all() {
             }
         } else if (const auto file = doc.find(at, "file")) {
             at = *file;
+        } else if (const auto formula = doc.find(at, "expression")) {
+            at = *formula;
         }
         return doc.error(at, error.message);
     };

@@ -3,6 +3,7 @@
 
 #include "sdf/bounds.h"
 
+#include "sdf/custom.h"
 #include "sdf/eval_isa.h"
 #include "sdf/tables.h"
 
@@ -31,7 +32,13 @@ Box3 from_host(const host::Bounds& b) { return {{b.lo.x, b.lo.y, b.lo.z}, {b.hi.
 
 }  // namespace
 
-Box3 shape_bounds(const Shape& shape) { return from_host(host::shape_bounds(shape.kind, shape.params.data())); }
+Box3 shape_bounds(const Shape& shape) {
+    if (shape_rows()[shape.kind].how == KindRow::Custom) {
+        const auto custom = check_custom(shape);
+        return custom ? Box3{-custom->half_extents, custom->half_extents} : Box3{};
+    }
+    return from_host(host::shape_bounds(shape.kind, shape.params.data()));
+}
 
 Box3 warp_bounds(const Warp& warp, const Box3& child, float rate) {
     const Box3 out = from_host(host::warp_bounds(warp.kind, warp.params.data(), to_host(child)));

@@ -4,6 +4,8 @@
 // become unions of their nearest copies. Then registers are dealt out and the code is written.
 
 #include "sdf/bounds.h"
+#include "sdf/custom.h"
+#include "sdf/expression_code.h"
 #include "sdf/program.h"
 #include "sdf/resolve.h"
 #include "sdf/tables.h"
@@ -11,6 +13,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <mutex>
 #include <string>
 
@@ -18,6 +21,8 @@ namespace kiln::sdf {
 namespace {
 
 constexpr uint32_t kNone = UINT32_MAX;
+// What a formula may use before it keeps values in memory; trees around it need the others.
+constexpr uint32_t kFormulaRegisters = 16;
 
 // q = M · (p − t), in double until it is written to the tape.
 struct AffineMap {
@@ -78,12 +83,15 @@ struct ChainStep {
 struct Binary {
     enum class Kind : uint8_t { Leaf, Value, Bound, Combine };
     Kind kind = Kind::Leaf;
-    bool lacks_material = false;  // some leaf under it carries none
-    uint8_t need = 1;             // registers
+    bool lacks_material = false;    // some leaf under it carries none
+    uint8_t need = 1;               // registers
+    Opcode opcode = Opcode::Shape;  // of a Leaf
     uint32_t aux = 0;
     uint32_t chain = kNone;
     uint32_t param = 0;
     uint32_t left = kNone, right = kNone;
+    const Formula* source = nullptr;  // Leaf of an expression: `param` is its Result's
+    const FormulaCode* formula = nullptr;
 };
 
 // A node still to be expanded into binary node `parent`'s left or right.
@@ -122,7 +130,15 @@ public:
             const float k = edit.blend_radius;
             const float k_material = edit.material_blend_radius < 0 ? k : edit.material_blend_radius;
             expand(edit);
+            formula_registers_ = kFormulaRegisters;
+            write_formulas();
             deal_registers();
+            for (uint32_t most = kFormulaRegisters / 2; nodes_[0].need >= kRegisters && most >= kFewestFormulaRegisters;
+                 most /= 2) {
+                formula_registers_ = most;
+                write_formulas();
+                deal_registers();
+            }
             if (nodes_[0].need >= kRegisters)
                 return Error{"edit " + edit.name + ": needs too many registers", ErrorKind::Input};
             emit(0, 1);
@@ -346,17 +362,68 @@ private:
 
     void add_leaf(const Task& task) {
         const Shape& shape = task.node->shape;
+        if (shape_rows()[shape.kind].how == KindRow::Formula) {
+            const PreparedFormula& prepared = resolved_.formula_of(shape);
+            Binary formula;
+            formula.source = &prepared.formula;
+            return add_boxed(task, formula, prepared.lipschitz, {});
+        }
+        if (shape_rows()[shape.kind].how == KindRow::Custom) {
+            Binary custom;
+            custom.opcode = Opcode::Custom;
+            custom.aux = custom_index(shape.kind);
+            return add_boxed(task, custom, check_custom(shape)->lipschitz, shape.params);
+        }
         const std::array<float, kMaxParams> params = resolved_.params_of(shape);
         Binary leaf;
         leaf.aux = shape.kind;
         leaf.chain = flush(task.chain, task.pending);
         leaf.param = add_params({float(task.scale), float(task.material), float(row_)}, params);
-        leaf.lacks_material = task.material == kNoMaterial;
-        if (!leaf.lacks_material) {
-            const bool first = material_ == kNoMaterial;
-            material_ = first || material_ == task.material ? uint16_t(task.material) : kSeveralMaterials;
-        }
+        add_material(task, leaf);
         add_node(task, leaf);
+    }
+
+    void add_material(const Task& task, Binary& leaf) {
+        leaf.lacks_material = task.material == kNoMaterial;
+        if (leaf.lacks_material) return;
+        const bool first = material_ == kNoMaterial;
+        material_ = first || material_ == task.material ? uint16_t(task.material) : kSeveralMaterials;
+    }
+
+    // The bounded leaf of architecture §4 without a margin: the point is held in the box, where the slope's bound is proven, so
+    // max(value, distance from the box) is 1-Lipschitz everywhere.
+    void add_boxed(Task task, Binary leaf, float lipschitz, std::span<const float> params) {
+        const Box3 box = shape_bounds(task.node->shape);
+        const uint32_t chain = flush(task.chain, task.pending);
+        Binary bound;
+        bound.kind = Binary::Kind::Bound;
+        bound.chain = chain;
+        bound.param =
+            add_params({float(task.scale), kEmpty, box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z});
+        task.parent = add_node(task, bound);
+        task.right = false;
+        leaf.chain = add_step(chain, Opcode::PointClamp, 0,
+                              add_params({box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z}));
+        leaf.param = add_params({float(task.scale / double(lipschitz)), float(task.material), float(row_)}, params);
+        add_material(task, leaf);
+        add_node(task, leaf);
+    }
+
+    // The code of every formula of the edit, once each, for as many registers as formula_registers_ says.
+    void write_formulas() {
+        formulas_.clear();
+        for (Binary& n : nodes_) {
+            if (n.source == nullptr) continue;
+            auto& written = formulas_[n.source];
+            if (written.code.empty()) {
+                written = formula_code(*n.source, formula_registers_);
+                const uint32_t numbers = add_params({}, written.params);
+                for (Instruction& in : written.code) in.param = reads_number(in.aux()) ? in.param + numbers : 0;
+                out_.memory_slots = std::max(out_.memory_slots, written.memory_slots);
+            }
+            n.formula = &written;
+            n.need = uint8_t(written.registers);
+        }
     }
 
     // Children have higher indices than their parents, so one backward pass sees every child first.
@@ -383,6 +450,17 @@ private:
         std::reverse(code_.begin() + long(from), code_.end());
     }
 
+    void emit_formula(const Binary& n, uint32_t dst) {
+        for (const Instruction in : n.formula->code) {
+            const Fn fn = Fn(in.aux() & kFnBits);
+            const bool reads = operands(fn) > 0 || fn == Fn::Store;
+            const uint32_t a = reads && (in.aux() & kNumberA) == 0 ? in.a() + dst : dst;
+            const uint32_t b = operands(fn) == 2 && (in.aux() & kNumberB) == 0 ? in.b() + dst : dst;
+            code_.push_back(Instruction::make(Opcode::Arithmetic, in.aux(), in.dst() + dst, a, b, in.param));
+        }
+        code_.push_back(Instruction::make(Opcode::Result, 0, dst, n.formula->result + dst, 0, n.param));
+    }
+
     void emit(uint32_t root, uint32_t dst) {
         struct Visit {
             uint32_t node;
@@ -396,7 +474,11 @@ private:
             const Binary& n = nodes_[v.node];
             if (n.kind == Binary::Kind::Leaf) {
                 emit_chain(n.chain);
-                code_.push_back(Instruction::make(Opcode::Shape, n.aux, v.dst, 0, 0, n.param));
+                if (n.formula != nullptr) {
+                    emit_formula(n, v.dst);
+                    continue;
+                }
+                code_.push_back(Instruction::make(n.opcode, n.aux, v.dst, 0, 0, n.param));
             } else if (n.kind != Binary::Kind::Combine) {
                 if (v.stage == 0) {
                     stack.push_back({v.node, v.dst, 1});
@@ -431,6 +513,8 @@ private:
     std::vector<float> params_;
     std::vector<Instruction> code_;
     std::vector<Binary> nodes_;
+    std::map<const Formula*, FormulaCode> formulas_;
+    uint32_t formula_registers_ = kFormulaRegisters;
     std::vector<ChainStep> steps_;
     std::vector<Task> tasks_;
 };

@@ -145,7 +145,8 @@ void ListCuller::write_content(const Entry& entry, vec3 center, float radius, bo
     if (entry.tree) {
         // A copy: `out` may be where the code lies.
         const std::vector<Instruction> source(code.begin(), code.end());
-        prune_edit({source, numbers_.params, numbers_.samples}, center, radius, whole, out, prune_);
+        prune_edit({source, numbers_.params, numbers_.samples, numbers_.memory_slots}, center, radius, whole, out,
+                   prune_);
         return;
     }
     if (whole) {

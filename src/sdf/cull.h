@@ -62,7 +62,9 @@ private:
         bool made;  // the code was made for this list; else it is the program's
         bool tree;  // has something to prune inside
     };
-    static TapeView numbers_of(const Program& program) { return {{}, program.params.data(), program.samples.data()}; }
+    static TapeView numbers_of(const Program& program) {
+        return {{}, program.params.data(), program.samples.data(), program.memory_slots};
+    }
     std::span<const Instruction> code_of(const Entry& entry) const;
     /// fn(entry number, won, shown) for everything that a ball keeps, in order.
     template <typename Fn>

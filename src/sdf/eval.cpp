@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <string_view>
+#include <vector>
 
 namespace kiln::sdf {
 
@@ -54,6 +55,17 @@ Isa choose() {
     return Isa::Scalar;
 }
 
+// A thread's memory for formulas, aligned for every lane type. Null for tapes without any.
+void* memory_of(uint32_t slots, size_t slot_bytes) {
+    if (slots == 0) return nullptr;
+    static thread_local std::vector<std::byte> bytes;
+    constexpr size_t kAlign = 64;
+    if (bytes.size() < slots * slot_bytes + kAlign) bytes.resize(slots * slot_bytes + kAlign);
+    const auto at = reinterpret_cast<uintptr_t>(bytes.data());
+    return bytes.data() + (kAlign - at % kAlign) % kAlign;
+}
+constexpr size_t kChunkBytes = 64 * sizeof(float);
+
 }  // namespace
 
 bool has_isa(Isa isa) { return processor_has(isa); }
@@ -71,23 +83,26 @@ Isa best_isa() {
 
 void evaluate(const TapeView& tape, const Points& points, float* out, Isa isa) {
     const auto run = KILN_CHOOSE(isa, evaluate_points);
-    run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x, points.y, points.z, points.count, out);
+    run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x, points.y, points.z, points.count, out,
+        memory_of(tape.memory_slots, kChunkBytes));
 }
 
 void evaluate_materials(const TapeView& tape, const Points& points, float* out, MaterialMix* mix, bool edits, Isa isa) {
     const auto run = KILN_CHOOSE(isa, evaluate_mixes);
     constexpr int kBatch = 512;
     float id0[kBatch], id1[kBatch], share[kBatch];
+    void* const memory = memory_of(tape.memory_slots, kChunkBytes);
     for (int at = 0; at < points.count; at += kBatch) {
         const int n = std::min(kBatch, points.count - at);
         run(words(tape.code), tape.code.size(), tape.params, tape.samples, points.x + at, points.y + at, points.z + at,
-            n, out + at, id0, id1, share, edits ? 2 : 1);
+            n, out + at, id0, id1, share, edits ? 2 : 1, memory);
         for (int i = 0; i < n; ++i) mix[at + i] = {uint16_t(id0[i]), uint16_t(id1[i]), share[i]};
     }
 }
 
 double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix, bool edits) {
     exact::Registers r;
+    r.memory = static_cast<exact::Chunk*>(memory_of(tape.memory_slots, sizeof(exact::Chunk)));
     r.cell[0].v[0] = p_world.x;
     r.cell[1].v[0] = p_world.y;
     r.cell[2].v[0] = p_world.z;
@@ -106,12 +121,13 @@ double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix, bool edit
 void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, const Balls& balls, uint64_t* left,
                uint64_t* right, float* value, Isa isa) {
     KILN_CHOOSE(isa, fold_list)
-    (entries.data(), entries.size(), numbers.params, numbers.samples, balls, left, right, value);
+    (entries.data(), entries.size(), numbers.params, numbers.samples, balls, left, right, value,
+     memory_of(numbers.memory_slots, kChunkBytes));
 }
 
 float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out, Isa isa) {
-    return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z,
-                                            out);
+    return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z, out,
+                                            memory_of(tape.memory_slots, kChunkBytes));
 }
 
 void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes, Isa isa) {

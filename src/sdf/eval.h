@@ -35,10 +35,13 @@ struct TapeView {
     std::span<const Instruction> code;
     const float* params;
     const float* samples;
+    uint32_t memory_slots = 0;  ///< Program::memory_slots
 };
-inline TapeView view(const Program& program) { return {program.tape(), program.params.data(), program.samples.data()}; }
+inline TapeView view(const Program& program) {
+    return {program.tape(), program.params.data(), program.samples.data(), program.memory_slots};
+}
 inline TapeView view(const Program& program, std::span<const Instruction> code) {
-    return {code, program.params.data(), program.samples.data()};
+    return {code, program.params.data(), program.samples.data(), program.memory_slots};
 }
 
 /// out[i] = value of the tape at point i, metres. Any thread; any count.

@@ -16,6 +16,7 @@ namespace kiln::sdf::avx2 {
 #define KILN_T real
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
 #include "sdf/lang/material.sdf.h"
 
 #include "sdf/texts.gen.inl"
@@ -32,4 +33,5 @@ static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof 
 
 static inline uint32_t lane_bits(mask m) { return uint32_t(_mm256_movemask_ps(__m256(m.v))); }
 #include "sdf/eval_list.inl"
+#include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::avx2

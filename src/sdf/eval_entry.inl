@@ -23,8 +23,9 @@ static void store_chunk(const Chunk& from, float* to, int count) {
 }
 
 void evaluate_points(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
-                     const float* z, int points, float* out) {
+                     const float* z, int points, float* out, void* memory) {
     Registers r;
+    r.memory = static_cast<Chunk*>(memory);
     for (int at = 0; at < points; at += kChunkPoints) {
         const int n = points - at < kChunkPoints ? points - at : kChunkPoints;
         load_chunk(r, x + at, y + at, z + at, n);
@@ -35,8 +36,9 @@ void evaluate_points(const uint32_t* code, size_t count, const float* params, co
 
 // ids: two floats a point.
 void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
-                    const float* z, int points, float* out, float* id0, float* id1, float* share, int slot) {
+                    const float* z, int points, float* out, float* id0, float* id1, float* share, int slot, void* memory) {
     Registers r;
+    r.memory = static_cast<Chunk*>(memory);
     MixChunk mix[kRegisters];
     for (int at = 0; at < points; at += kChunkPoints) {
         const int n = points - at < kChunkPoints ? points - at : kChunkPoints;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "sdf/eval.h"
+#include "sdf/expression_run.h"
 
 #include <kiln/shapes.h>
 
@@ -13,15 +14,18 @@
 #define KILN_DECLARE_ISA(name)                                                                                         \
     namespace kiln::sdf::name {                                                                                        \
     void evaluate_points(const uint32_t* code, size_t count, const float* params, const float* samples,                \
-                         const float* x, const float* y, const float* z, int points, float* out);                      \
+                         const float* x, const float* y, const float* z, int points, float* out, void* memory);        \
     void evaluate_mixes(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, \
                         const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,  \
-                        int slot);                                                                                     \
+                        int slot, void* memory);                                                                       \
     void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples,                  \
-                   const Balls& balls, uint64_t* left, uint64_t* right, float* value);                                 \
+                   const Balls& balls, uint64_t* left, uint64_t* right, float* value, void* memory);                   \
     float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples,                \
-                         const float* x, const float* y, const float* z, float* out);                                  \
+                         const float* x, const float* y, const float* z, float* out, void* memory);                    \
     void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes);      \
+    void run_formula_points(const FormulaOp* code, size_t count, void* registers, uint32_t result, float* out);        \
+    void run_formula_tiles(const FormulaOp* code, size_t count, const float* bounds, void* registers, uint32_t result, \
+                           uint16_t* choices, float* out);                                                             \
     }
 KILN_DECLARE_ISA(scalar)
 KILN_DECLARE_ISA(sse4)
@@ -33,6 +37,9 @@ namespace kiln::sdf {
 // Shapes whose leaves run over a whole brick in one loop.
 inline constexpr uint32_t kFusedSphere = uint32_t(ShapeKind::Sphere);
 inline constexpr uint32_t kFusedBox = uint32_t(ShapeKind::Box);
+/// Custom instructions' way out of the lanes (custom.h).
+void custom_points(uint32_t index, const float* params, const double* x, const double* y, const double* z, int count,
+                   double* out);
 }  // namespace kiln::sdf
 
 // Texts shared with GLSL name parameters they do not always use.

@@ -4,9 +4,7 @@
 // Uses no standard-library templates: what a wide instruction set compiles here must not be shared with other files.
 // KILN_VECTORS: vectors in a chunk. load(), store() and real are the including file's.
 
-struct Chunk {
-    real v[KILN_VECTORS];
-};
+#include "sdf/expression.inl"
 
 struct MixChunk {
     Mix v[KILN_VECTORS];
@@ -16,6 +14,7 @@ struct Registers {
     Chunk cell[3];             // C
     Chunk point[3];            // P
     Chunk value[kRegisters];
+    Chunk* memory;             // of formulas with more values than registers; null where the tape has none
 };
 
 static inline real3 point_at(const Chunk* p, int i) { return real3(p[0].v[i], p[1].v[i], p[2].v[i]); }
@@ -41,11 +40,53 @@ static inline real box_distance(real3 p, param3 lo, param3 hi) {
     return length(max(q, real3(zero, zero, zero))) + min(max(q.x, max(q.y, q.z)), zero);
 }
 
+// One step of a formula. An operand may be the instruction's own number.
+static void formula_step(Registers& r, uint32_t word, const float* w) {
+    const uint32_t aux = (word >> 5) & 255u;
+    const Fn fn = Fn(aux & kFnBits);
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    const Chunk* a = &r.value[(word >> 18) & 31u];
+    const Chunk* b = &r.value[(word >> 23) & 31u];
+    switch (fn) {
+        case Fn::X: dst = r.point[0]; return;
+        case Fn::Y: dst = r.point[1]; return;
+        case Fn::Z: dst = r.point[2]; return;
+        case Fn::Constant: chunk_of(dst, real(param(w[0]))); return;
+        case Fn::Store: r.memory[uint32_t(w[0])] = *a; return;
+        case Fn::Load: dst = r.memory[uint32_t(w[0])]; return;
+        default: break;
+    }
+    Chunk number;
+    if ((aux & (kNumberA | kNumberB)) != 0) {
+        chunk_of(number, real(param(w[0])));
+        ((aux & kNumberA) != 0 ? a : b) = &number;
+    }
+    arithmetic(dst, *a, *b, fn);
+}
+
+// The distance a formula or a user's shape stands for: nothing where it is no number.
+static inline real cleaned(real v) { return select(lt(abs(v), real(param(kEmpty))), v, real(param(kEmpty))); }
+
+// A user's function sees doubles, so that one function serves every lane type, exact answers among them.
+static void custom_step(Chunk& dst, const Chunk* point, uint32_t index, const float* w) {
+    constexpr int kCount = int(sizeof(Chunk) / sizeof(param));
+    param lanes[kCount];
+    double p[3][kCount], d[kCount];
+    for (int axis = 0; axis < 3; ++axis) {
+        __builtin_memcpy(lanes, &point[axis], sizeof lanes);
+        for (int i = 0; i < kCount; ++i) p[axis][i] = double(lanes[i]);
+    }
+    custom_points(index, w + 3, p[0], p[1], p[2], kCount, d);
+    for (int i = 0; i < kCount; ++i) lanes[i] = param(d[i]);
+    __builtin_memcpy(&dst, lanes, sizeof lanes);
+    for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = cleaned(dst.v[i]) * param(w[0]);
+}
+
 // One instruction that moves the point or makes or changes one value. Kept apart so that both interpreters share its code.
 static __attribute__((noinline)) void step(Registers& r, uint32_t word, const float* w, Samples samples) {
-    const uint32_t aux = (word >> 4) & 255u;
-    Chunk& dst = r.value[(word >> 12) & 31u];
-    switch (Opcode(word & 15u)) {
+    const uint32_t aux = (word >> 5) & 255u;
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    switch (Opcode(word & 31u)) {
         case Opcode::PointCell:
             for (int i = 0; i < KILN_VECTORS; ++i) set_point(r.point, i, point_at(r.cell, i));
             break;
@@ -65,6 +106,10 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
             for (int i = 0; i < KILN_VECTORS; ++i)
                 set_point(r.point, i, copy_warp(aux, point_at(r.point, i), w + 6, param3_at(w), param3_at(w + 3)));
             break;
+        case Opcode::PointClamp:
+            for (int i = 0; i < KILN_VECTORS; ++i)
+                set_point(r.point, i, clamp(point_at(r.point, i), param3_at(w), param3_at(w + 3)));
+            break;
         case Opcode::Shape:
             for (int i = 0; i < KILN_VECTORS; ++i)
                 dst.v[i] = shape_distance(aux, point_at(r.point, i), w + 3, samples) * param(w[0]);
@@ -79,6 +124,13 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
                 dst.v[i] = max(min(dst.v[i], real(param(w[1]))), box);
             }
             break;
+        case Opcode::Arithmetic: formula_step(r, word, w); break;
+        case Opcode::Custom: custom_step(dst, r.point, aux, w); break;
+        case Opcode::Result: {
+            const Chunk& from = r.value[(word >> 18) & 31u];
+            for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = cleaned(from.v[i]) * param(w[0]);
+            break;
+        }
         default: __builtin_unreachable();
     }
 }
@@ -87,11 +139,11 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
         const float* w = params + code[2 * pc + 1];
-        Chunk& dst = r.value[(word >> 12) & 31u];
-        const Chunk& a = r.value[(word >> 17) & 31u];
-        const Chunk& b = r.value[(word >> 22) & 31u];
-        const uint32_t aux = (word >> 4) & 255u;
-        switch (Opcode(word & 15u)) {
+        Chunk& dst = r.value[(word >> 13) & 31u];
+        const Chunk& a = r.value[(word >> 18) & 31u];
+        const Chunk& b = r.value[(word >> 23) & 31u];
+        const uint32_t aux = (word >> 5) & 255u;
+        switch (Opcode(word & 31u)) {
             case Opcode::Combine: {
                 const param k = param(w[0]);
                 switch (aux & 3u) {
@@ -138,14 +190,14 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
         const float* w = params + code[2 * pc + 1];
-        const uint32_t d = (word >> 12) & 31u;
+        const uint32_t d = (word >> 13) & 31u;
         Chunk& dst = r.value[d];
-        const Chunk& a = r.value[(word >> 17) & 31u];
-        const Chunk& b = r.value[(word >> 22) & 31u];
-        const MixChunk& mix_a = mix[(word >> 17) & 31u];
-        const MixChunk& mix_b = mix[(word >> 22) & 31u];
-        const uint32_t aux = (word >> 4) & 255u;
-        switch (Opcode(word & 15u)) {
+        const Chunk& a = r.value[(word >> 18) & 31u];
+        const Chunk& b = r.value[(word >> 23) & 31u];
+        const MixChunk& mix_a = mix[(word >> 18) & 31u];
+        const MixChunk& mix_b = mix[(word >> 23) & 31u];
+        const uint32_t aux = (word >> 5) & 255u;
+        switch (Opcode(word & 31u)) {
             case Opcode::Combine:
                 for (int i = 0; i < KILN_VECTORS; ++i) {
                     const uint32_t op = aux & 3u;
@@ -186,6 +238,8 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
                 }
                 break;
             case Opcode::Shape:
+            case Opcode::Result:
+            case Opcode::Custom:
                 step(r, word, w, samples);
                 for (int i = 0; i < KILN_VECTORS; ++i) mix[d].v[i] = make_mix(real(param(w[slot])), none, zero);
                 break;

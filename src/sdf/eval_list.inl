@@ -14,8 +14,9 @@ static inline uint64_t chunk_bits(const mask* m) {
 
 // See sdf/eval.h.
 void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples, const Balls& balls, uint64_t* left,
-               uint64_t* right, float* value) {
+               uint64_t* right, float* value, void* memory) {
     Registers r;
+    r.memory = static_cast<Chunk*>(memory);
     load_chunk(r, balls.x, balls.y, balls.z, kChunkPoints);
     Chunk ball;  // what rounding is counted from: largest coordinate of the centre, and the radius
     for (int i = 0; i < KILN_VECTORS; ++i) {
@@ -141,8 +142,8 @@ static BrickLeaf leaf_of(int join) {
 static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* params, const float*& t, float& k) {
     static const float kOrigin[3] = {0, 0, 0};
     if (left < 3) return nullptr;
-    const Opcode point = Opcode(code[0] & 15u), shape = Opcode(code[2] & 15u), join = Opcode(code[4] & 15u);
-    if (shape != Opcode::Shape || ((code[2] >> 12) & 31u) != 1u) return nullptr;
+    const Opcode point = Opcode(code[0] & 31u), shape = Opcode(code[2] & 31u), join = Opcode(code[4] & 31u);
+    if (shape != Opcode::Shape || ((code[2] >> 13) & 31u) != 1u) return nullptr;
     if (point == Opcode::PointTranslate) {
         t = params + code[1];
     } else if (point == Opcode::PointCell) {
@@ -150,7 +151,7 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
     } else {
         return nullptr;
     }
-    const uint32_t dst = (code[4] >> 12) & 31u, a = (code[4] >> 17) & 31u, b = (code[4] >> 22) & 31u, aux = (code[4] >> 4) & 255u;
+    const uint32_t dst = (code[4] >> 13) & 31u, a = (code[4] >> 18) & 31u, b = (code[4] >> 23) & 31u, aux = (code[4] >> 5) & 255u;
     int how = -1;
     k = 0;
     if (join == Opcode::Combine && dst == 0 && a == 0 && b == 1 && (aux & 3u) < 2u) {
@@ -164,7 +165,7 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
         how = aux == 1u ? 5 : 4;
     }
     if (how < 0) return nullptr;
-    switch ((code[2] >> 4) & 255u) {
+    switch ((code[2] >> 5) & 255u) {
         case kFusedSphere: return leaf_of<kFusedSphere>(how);
         case kFusedBox: return leaf_of<kFusedBox>(how);
         default: return nullptr;
@@ -173,7 +174,7 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
 
 // Texel (i, j, k) is at (x[i], y[j], z[k]); out[(k * 8 + j) * 8 + i]. Returns the smallest |value|.
 float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
-                     const float* z, float* out) {
+                     const float* z, float* out, void* memory) {
     alignas(64) float row_x[kChunkPoints], row_y[kChunkPoints];
     for (int i = 0; i < kChunkPoints; ++i) {
         row_x[i] = x[i & 7];
@@ -189,13 +190,14 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
 
     BrickValues values;
     size_t pc = 0;
-    if (count > 0 && Opcode(code[0] & 15u) == Opcode::Empty && ((code[0] >> 12) & 31u) == 0u) {
+    if (count > 0 && Opcode(code[0] & 31u) == Opcode::Empty && ((code[0] >> 13) & 31u) == 0u) {
         pc = 1;
         for (int slice = 0; slice < kBrickSlices; ++slice) {
             for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = real(param(kEmpty));
         }
     }
     Registers r;
+    r.memory = static_cast<Chunk*>(memory);
     while (pc < count) {
         const float* t;
         float k;
@@ -208,7 +210,7 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
         size_t end = pc;
         while (end < count) {
             const uint32_t word = code[2 * end++];
-            if (Opcode(word & 15u) > Opcode::PointCopy && ((word >> 12) & 31u) == 0u) break;
+            if (Opcode(word & 31u) > Opcode::PointClamp && ((word >> 13) & 31u) == 0u) break;
         }
         for (int slice = 0; slice < kBrickSlices; ++slice) {
             for (int i = 0; i < kSliceVectors; ++i) {

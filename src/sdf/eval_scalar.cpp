@@ -11,6 +11,7 @@ namespace kiln::sdf::scalar {
 #define KILN_T real
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
 #include "sdf/lang/material.sdf.h"
 
 #include "sdf/texts.gen.inl"
@@ -23,4 +24,5 @@ static inline void store(float* to, real v) { *to = v; }
 
 static inline uint32_t lane_bits(mask m) { return m ? 1u : 0u; }
 #include "sdf/eval_list.inl"
+#include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::scalar

@@ -16,6 +16,7 @@ namespace kiln::sdf::sse4 {
 #define KILN_T real
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
 #include "sdf/lang/material.sdf.h"
 
 #include "sdf/texts.gen.inl"
@@ -32,4 +33,5 @@ static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof 
 
 static inline uint32_t lane_bits(mask m) { return uint32_t(_mm_movemask_ps(__m128(m.v))); }
 #include "sdf/eval_list.inl"
+#include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::sse4

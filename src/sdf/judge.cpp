@@ -5,6 +5,7 @@
 #include "sdf/judge.h"
 
 #include "sdf/bounds.h"
+#include "sdf/custom.h"
 #include "sdf/eval_isa.h"
 #include "sdf/resolve.h"
 #include "sdf/tables.h"
@@ -173,6 +174,23 @@ double Judge::distance(dvec3 p_world) const {
                                      f.p};
                     stack.push_back(next);
                 }
+            } else if (shape_rows()[node.shape.kind].how == KindRow::Formula) {
+                const PreparedFormula& formula = r.formula_of(node.shape);
+                const Box3 box = shape_bounds(node.shape);
+                const real3 q = clamp(f.p, to_real3(box.min), to_real3(box.max));
+                const double value = evaluate(formula.formula, {q.x, q.y, q.z});
+                const double known = std::fabs(value) < double(kEmpty) ? value : double(kEmpty);
+                answer = std::max(known / double(formula.lipschitz), box_distance(f.p, box));
+                stack.pop_back();
+            } else if (shape_rows()[node.shape.kind].how == KindRow::Custom) {
+                const Box3 box = shape_bounds(node.shape);
+                const real3 q = clamp(f.p, to_real3(box.min), to_real3(box.max));
+                double value = 0;
+                custom_distances(custom_index(node.shape.kind), node.shape.params.data(), {&q.x, &q.y, &q.z, 1},
+                                 &value);
+                const double known = std::fabs(value) < double(kEmpty) ? value : double(kEmpty);
+                answer = std::max(known / double(check_custom(node.shape)->lipschitz), box_distance(f.p, box));
+                stack.pop_back();
             } else {
                 const std::array<float, kMaxParams> params = r.params_of(node.shape);
                 answer =

@@ -12,6 +12,7 @@
 
 #include "base/append_array.h"
 #include "sdf/edit_index.h"
+#include "sdf/expression_fn.h"
 
 #include <kiln/edit.h>
 #include <kiln/result.h>
@@ -34,7 +35,7 @@ inline constexpr uint32_t kDefaultMaterial = 0;
 inline constexpr uint16_t kSeveralMaterials = 65534;  ///< of an edit: its leaves are of more than one
 inline constexpr uint32_t material_number(MaterialId id) { return id ? id.index + 1 : kDefaultMaterial; }
 
-// Instruction word: opcode 0-3, aux 4-11, dst 12-16, a 17-21, b 22-26. `param` indexes Program::params.
+// Instruction word: opcode 0-4, aux 5-12, dst 13-17, a 18-22, b 23-27. `param` indexes Program::params.
 enum class Opcode : uint32_t {
     PointCell,       // P = C                                                 (starts a chain)
     PointTranslate,  // P = C − t               t[3]                           (starts a chain)
@@ -42,6 +43,7 @@ enum class Opcode : uint32_t {
     PointAffineOn,   // P = M · (P − t)         t[3] M[9]
     PointWarp,       // P = point_warp[aux](P)  its params
     PointCopy,       // P = copy_warp[aux](P)   middle[3] second[3] its params
+    PointClamp,      // P = clamp(P, lo, hi)    lo[3] hi[3]
     Shape,           // R[dst] = s · shape[aux](P)                 s, material, edit, its params
     Value,           // R[dst] = s · value_warp[aux](R[dst] / s, P)  s, 1/s, its params
     Bound,           // R[dst] = max(min(R[dst], m), s · signed distance(P, box))   s, m, lo[3] hi[3]
@@ -53,23 +55,45 @@ enum class Opcode : uint32_t {
     // Only in pruned code, where R[b] won a Combine by distance but what R[a] was made of still shows through:
     Take,      // R[dst] = R[b] (aux 0) or −R[b] (aux 1); material: R[b]'s, or R[a]'s where R[b] has none
     Constant,  // R[dst] = 0 with the material (edit) of the Shape at param: only its material is looked at
+    // Formulas (expression.h): registers hold numbers here, not distances, until Result.
+    Arithmetic,  // R[dst] = Fn(aux & kFnBits)(R[a], R[b])   kNumberA, kNumberB: that operand is the one number; Store, Load: slot
+    Result,  // R[dst] = s · R[a], kEmpty for NaN        s, material, edit
+    Custom,  // R[dst] = s · custom[aux](P), kEmpty for NaN   s, material, edit, its params. Not on the GPU
 };
 inline constexpr uint32_t kMayLackMaterial = 4;
+inline constexpr uint32_t kFnBits = 63, kNumberA = 64, kNumberB = 128;
+
+/// Does an Arithmetic instruction of this aux read the number at its param?
+inline constexpr bool reads_number(uint32_t aux) {
+    const Fn fn = Fn(aux & kFnBits);
+    return (aux & (kNumberA | kNumberB)) != 0 || fn == Fn::Constant || fn == Fn::Store || fn == Fn::Load;
+}
 
 struct Instruction {
     uint32_t word;
     uint32_t param;
 
     static constexpr Instruction make(Opcode op, uint32_t aux, uint32_t dst, uint32_t a, uint32_t b, uint32_t param) {
-        return {uint32_t(op) | aux << 4 | dst << 12 | a << 17 | b << 22, param};
+        return {uint32_t(op) | aux << 5 | dst << 13 | a << 18 | b << 23, param};
     }
-    constexpr Opcode opcode() const { return Opcode(word & 15u); }
-    constexpr uint32_t aux() const { return (word >> 4) & 255u; }
-    constexpr uint32_t dst() const { return (word >> 12) & 31u; }
-    constexpr uint32_t a() const { return (word >> 17) & 31u; }
-    constexpr uint32_t b() const { return (word >> 22) & 31u; }
+    constexpr Opcode opcode() const { return Opcode(word & 31u); }
+    constexpr uint32_t aux() const { return (word >> 5) & 255u; }
+    constexpr uint32_t dst() const { return (word >> 13) & 31u; }
+    constexpr uint32_t a() const { return (word >> 18) & 31u; }
+    constexpr uint32_t b() const { return (word >> 23) & 31u; }
+    /// Makes a value with a material and an edit's number: param + 1, param + 2.
+    constexpr bool has_material() const {
+        return opcode() == Opcode::Shape || opcode() == Opcode::Constant || opcode() == Opcode::Result ||
+               opcode() == Opcode::Custom;
+    }
+    /// Has no twin on the GPU: a formula's values in memory, a program's own shape.
+    constexpr bool cpu_only() const {
+        if (opcode() == Opcode::Custom) return true;
+        const Fn fn = Fn(aux() & kFnBits);
+        return opcode() == Opcode::Arithmetic && (fn == Fn::Store || fn == Fn::Load);
+    }
     constexpr bool starts_chain() const { return opcode() <= Opcode::PointAffine; }
-    constexpr bool moves_point() const { return opcode() <= Opcode::PointCopy; }
+    constexpr bool moves_point() const { return opcode() <= Opcode::PointClamp; }
     friend bool operator==(const Instruction&, const Instruction&) = default;
 };
 static_assert(sizeof(Instruction) == 8);
@@ -111,7 +135,8 @@ public:
     std::vector<uint32_t> meshes;  ///< blocks of samples where each begins
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
-    bool unbounded = false;  ///< some visible union edit has infinite bounds
+    bool unbounded = false;     ///< some visible union edit has infinite bounds
+    uint32_t memory_slots = 0;  ///< values that formulas keep outside the registers at once; the GPU has none
 
     /// Rows of the visible edits, in order.
     std::vector<uint32_t> rows() const;

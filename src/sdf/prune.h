@@ -15,6 +15,10 @@ namespace kiln::sdf {
 struct PruneScratch {
     std::vector<float> left, right;
     std::vector<Instruction> reversed;
+    std::vector<uint8_t> operand;  ///< of Min and Max in formulas: 1 or 2 where a or b is the result all over the ball
+    std::vector<float> memory;     ///< of formulas, at the centre
+    std::vector<float> ranges;     ///< and over the ball, two numbers a slot
+    std::vector<uint8_t> slot_needed;
 };
 
 /// Prunes `tape` for the ball of `radius` around `center` (world metres). Writes the kept code to `out` (cleared first) and

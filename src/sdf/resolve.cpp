@@ -14,6 +14,7 @@
 #include "sdf/resolve.h"
 
 #include "sdf/bounds.h"
+#include "sdf/custom.h"
 #include "sdf/library/library.h"
 #include "sdf/tables.h"
 
@@ -30,6 +31,7 @@ namespace {
 constexpr float kSmallestRate = 1e-18f;
 
 bool is_mesh(const Shape& shape) { return ShapeKind(shape.kind) == ShapeKind::SampledMesh; }
+bool is_composite(const Shape& shape) { return shape_rows()[shape.kind].how == KindRow::Composite; }
 bool is_copies(const Warp& warp) { return warp_rows()[warp.kind].how == KindRow::Copies; }
 
 Error fail(Fault* fault, const Fault& where, std::string message) {
@@ -253,7 +255,7 @@ private:
     // Every composite shape in reach becomes one object per distinct parameter set.
     void collect_composites() {
         const auto add = [&](const Node& node) {
-            if (node.kind != Node::Kind::Shape || node.shape.kind < primitive_count()) return;
+            if (node.kind != Node::Kind::Shape || !is_composite(node.shape)) return;
             const auto key = std::pair(node.shape.kind, node.shape.params);
             const auto index = uint32_t(out_.source.objects.size() + out_.composites.size());
             if (out_.composite_index.emplace(key, index).second) {
@@ -273,7 +275,7 @@ private:
     // Depth-first over references, with a stack of its own: chains of references may be as long as memory allows.
     Result<void> visit_object_of(const Node& node) {
         if (node.kind == Node::Kind::Fold) return {};
-        if (node.kind == Node::Kind::Shape && node.shape.kind < primitive_count()) return {};
+        if (node.kind == Node::Kind::Shape && !is_composite(node.shape)) return {};
         struct Level {
             uint32_t object;
             uint32_t next_node;
@@ -346,6 +348,16 @@ private:
         return {};
     }
 
+    Result<void> prepare(const Shape& shape) {
+        auto& slot = out_.formulas[std::pair(std::string_view(shape.data), shape.params)];
+        if (slot) return {};
+        const float* p = shape.params.data();  // lipschitz, half_extents
+        auto made = prepare_formula(shape.data, {p[1], p[2], p[3]}, p[0]);
+        if (!made) return fail(fault_, where_, made.error().message);
+        slot = *made;
+        return {};
+    }
+
     // Shape::data is the index of a grid with at least 2 x 2 values, or of a mesh.
     bool has_grid(const Shape& shape) const {
         size_t index = 0;
@@ -376,6 +388,12 @@ private:
         } else {
             if (shape_rows()[node.shape.kind].how == KindRow::Sampled && !has_grid(node.shape)) {
                 return fail(fault_, where_, "refers to a file that was not loaded");
+            }
+            if (shape_rows()[node.shape.kind].how == KindRow::Formula) {
+                if (auto r = prepare(node.shape); !r) return r;
+            }
+            if (shape_rows()[node.shape.kind].how == KindRow::Custom) {
+                if (auto r = check_custom(node.shape); !r) return fail(fault_, where_, r.error().message);
             }
             Shape shape = node.shape;
             shape.params = out_.params_of(node.shape);
@@ -430,7 +448,7 @@ private:
 
 uint32_t Resolved::object_of(const Node& node) const {
     if (node.kind == Node::Kind::Object) return node.object.index;
-    if (node.kind == Node::Kind::Shape && node.shape.kind >= primitive_count()) {
+    if (node.kind == Node::Kind::Shape && is_composite(node.shape)) {
         return composite_index.at({node.shape.kind, node.shape.params});
     }
     return UINT32_MAX;
@@ -470,6 +488,10 @@ std::array<float, kMaxParams> Resolved::params_of(const Shape& shape) const {
         if (field.name == "step_z") params[at] = grids[index].steps.y;
     }
     return params;
+}
+
+const PreparedFormula& Resolved::formula_of(const Shape& shape) const {
+    return *formulas.at(std::pair(std::string_view(shape.data), shape.params));
 }
 
 Result<Resolved> resolve(const Source& source, Fault* fault) {

@@ -3,6 +3,7 @@
 // What the tape compiler and the judge both start from; it decides nothing about distances.
 #pragma once
 
+#include "sdf/expression_code.h"
 #include "sdf/program.h"
 
 #include <map>
@@ -50,7 +51,11 @@ struct Resolved {
     }
     /// The object a node stands for: a reference or a composite shape; UINT32_MAX for primitives and folds.
     uint32_t object_of(const Node& node) const;
+    /// Formulas of expressions, by their Shape's data and numbers.
+    const PreparedFormula& formula_of(const Shape& shape) const;
     std::map<std::pair<uint16_t, std::array<float, kMaxParams>>, uint32_t> composite_index;
+    std::map<std::pair<std::string_view, std::array<float, kMaxParams>>, std::shared_ptr<const PreparedFormula>>
+        formulas;
 };
 
 /// Follows everything the visible edits reach. Faults as compile().

@@ -3,6 +3,8 @@
 
 #include "sdf/tables.h"
 
+#include "sdf/custom.h"
+
 #include <charconv>
 #include <cmath>
 
@@ -26,9 +28,9 @@ float number(std::string_view text) {
 
 }  // namespace
 
-std::span<const KindRow> shape_rows() { return kShapeRows; }
+std::span<const KindRow> shape_rows() { return rows_with_custom(kShapeRows); }
 std::span<const KindRow> warp_rows() { return kWarpRows; }
-std::optional<uint16_t> shape_kind(std::string_view name) { return find(kShapeRows, name); }
+std::optional<uint16_t> shape_kind(std::string_view name) { return find(shape_rows(), name); }
 std::optional<uint16_t> warp_kind(std::string_view name) { return find(kWarpRows, name); }
 int primitive_count() { return kPrimitiveCount; }
 

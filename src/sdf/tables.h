@@ -29,7 +29,9 @@ struct KindRow {
         Exact,
         Bound,
         Sampled,
-        Composite,  // shapes: true distance outside; lower bound; also reads samples; a library object
+        Formula,
+        Composite,
+        Custom,  // shapes: true distance outside; lower bound; also reads samples; Shape::data compiled; a library object; a program's own
         Point,
         Value,
         Copies,  // warps: moves the point; changes the distance; several copies
@@ -46,13 +48,13 @@ struct KindRow {
     }
 };
 
-/// Shape rows, indexed by Shape::kind: primitives first, then composites.
+/// Shape rows, indexed by Shape::kind: primitives first, then composites, then what the program has registered (custom_shape.h).
 std::span<const KindRow> shape_rows();
 /// Warp rows, indexed by Warp::kind.
 std::span<const KindRow> warp_rows();
 std::optional<uint16_t> shape_kind(std::string_view name);
 std::optional<uint16_t> warp_kind(std::string_view name);
-/// Rows below this index are primitives (have a distance text); the others are composites.
+/// Rows below this index are primitives: built in, and no trees of others.
 int primitive_count();
 
 /// Why `value` may not stand in `field`, as "what is wrong; what would be right"; nothing when it may.

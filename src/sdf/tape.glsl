@@ -22,6 +22,8 @@
 #define KILN_T float
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
+#include "sdf/expression_fn.sdf.h"
 #ifdef KILN_TAPE_MATERIALS
 #include "sdf/lang/material.sdf.h"
 #endif
@@ -55,16 +57,49 @@ const uint kOpPointAffine = 2u;
 const uint kOpPointAffineOn = 3u;
 const uint kOpPointWarp = 4u;
 const uint kOpPointCopy = 5u;
-const uint kOpShape = 6u;
-const uint kOpValue = 7u;
-const uint kOpBound = 8u;
-const uint kOpCombine = 9u;
-const uint kOpMove = 10u;
-const uint kOpNegate = 11u;
-const uint kOpEmpty = 12u;
-const uint kOpTake = 13u;
-const uint kOpConstant = 14u;
+const uint kOpPointClamp = 6u;
+const uint kOpShape = 7u;
+const uint kOpValue = 8u;
+const uint kOpBound = 9u;
+const uint kOpCombine = 10u;
+const uint kOpMove = 11u;
+const uint kOpNegate = 12u;
+const uint kOpEmpty = 13u;
+const uint kOpTake = 14u;
+const uint kOpConstant = 15u;
+const uint kOpArithmetic = 16u;
+const uint kOpResult = 17u;
 const uint kOpPaint = 3u;  // value of kiln::Op::Paint
+
+// Of an Arithmetic instruction's aux, and values of sdf::Fn. Store and Load have no twin here: the renderer keeps tapes with values
+// in memory off the GPU.
+const uint kFnBits = 63u;
+const uint kNumberA = 64u;
+const uint kNumberB = 128u;
+
+float tape_arithmetic(uint fn, float a, float b) {
+    switch (fn) {
+        case 6u: return a;
+        case 7u: return -a;
+        case 8u: return abs(a);
+        case 9u: return fn_sqrt(a);
+        case 10u: return a * a;
+        case 11u: return floor(a);
+        case 12u: return fn_sin(a);
+        case 13u: return fn_cos(a);
+        case 14u: return exp_of(a);
+        case 15u: return log_of(a);
+        case 16u: return a + b;
+        case 17u: return a - b;
+        case 18u: return a * b;
+        case 19u: return a / b;
+        case 20u: return b < a ? b : a;
+        case 21u: return a < b ? b : a;
+        case 22u: return atan_of(a, b);
+        case 23u: return fn_mod(a, b);
+        default: return 0.0;
+    }
+}
 
 vec3 tape_vec3(uint at) { return vec3(sdf_param(at), sdf_param(at + 1u), sdf_param(at + 2u)); }
 
@@ -88,17 +123,17 @@ float tape_distance(uint first, uint count, vec3 p_world) {
         uvec2 instruction = sdf_code(pc);
         uint word = instruction.x;
         uint at = instruction.y;
-        uint aux = (word >> 4u) & 255u;
-        uint dst = (word >> 12u) & 31u;
-        uint a = (word >> 17u) & 31u;
-        uint b = (word >> 22u) & 31u;
-        switch (word & 15u) {
+        uint aux = (word >> 5u) & 255u;
+        uint dst = (word >> 13u) & 31u;
+        uint a = (word >> 18u) & 31u;
+        uint b = (word >> 23u) & 31u;
+        switch (word & 31u) {
             case kOpPointCell: p = p_world; break;
             case kOpPointTranslate: p = p_world - tape_vec3(at); break;
             case kOpPointAffine:
             case kOpPointAffineOn:
                 if (KILN_USES_OPCODE(kOpPointAffine) || KILN_USES_OPCODE(kOpPointAffineOn)) {
-                    p = tape_affine((word & 15u) == kOpPointAffine ? p_world : p, at);
+                    p = tape_affine((word & 31u) == kOpPointAffine ? p_world : p, at);
                 }
                 break;
             case kOpPointWarp:
@@ -106,6 +141,12 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                 break;
             case kOpPointCopy:
                 if (KILN_USES_OPCODE(kOpPointCopy)) p = copy_warp(aux, p, at + 6u, tape_vec3(at), tape_vec3(at + 3u));
+                break;
+            case kOpPointClamp:
+                if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
+                break;
+            case kOpPointClamp:
+                if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
                 break;
             case kOpShape:
                 value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);
@@ -115,6 +156,29 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                 break;
             case kOpValue:
                 if (KILN_USES_OPCODE(kOpValue)) value[dst] = value_warp(aux, value[dst] * sdf_param(at + 1u), p, at + 2u) * sdf_param(at);
+                break;
+            case kOpArithmetic:
+                if (KILN_USES_OPCODE(kOpArithmetic)) {
+                    uint fn = aux & kFnBits;
+                    if (fn < 3u) {
+                        value[dst] = fn == 0u ? p.x : fn == 1u ? p.y : p.z;
+                    } else if (fn == 3u) {
+                        value[dst] = sdf_param(at);
+                    } else {
+                        float left = (aux & kNumberA) != 0u ? sdf_param(at) : value[a];
+                        float right = (aux & kNumberB) != 0u ? sdf_param(at) : value[b];
+                        value[dst] = tape_arithmetic(fn, left, right);
+                    }
+                }
+                break;
+            case kOpResult:
+                if (KILN_USES_OPCODE(kOpResult)) {
+                    float number = value[a];
+                    value[dst] = (abs(number) < kTapeEmpty ? number : kTapeEmpty) * sdf_param(at);
+#ifdef KILN_TAPE_MATERIALS
+                    mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+#endif
+                }
                 break;
             case kOpBound:
                 if (KILN_USES_OPCODE(kOpBound)) {
@@ -136,7 +200,7 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             }
             case kOpMove:
             case kOpNegate:
-                value[dst] = (word & 15u) == kOpNegate ? -value[a] : value[a];
+                value[dst] = (word & 31u) == kOpNegate ? -value[a] : value[a];
 #ifdef KILN_TAPE_MATERIALS
                 mixes[dst] = mixes[a];
 #endif

@@ -71,6 +71,12 @@ void expect_one_line(const Outcome& o, const std::string& what) {
 constexpr const char* kNoVulkan = "VK_ICD_FILENAMES=/nonexistent VK_DRIVER_FILES=/nonexistent";
 constexpr const char* kBall = "{\"format\": 1, \"edits\": [{\"id\": \"ball\", \"shape\": \"sphere\", \"radius\": 1}]}";
 
+TEST_F(Cli, TheSampleOfAShapeOfItsOwnRuns) {
+    const std::string command = "'" KILN_BINARY_DIR "/bin/sample_custom_shape' > '" + (folder_ / "said").string() + "'";
+    ASSERT_EQ(std::system(command.c_str()), 0);
+    EXPECT_EQ(read(folder_ / "said"), "distance at (0, 2, 0): 1.45 m\nof the one in the scene: 0.90 m\n");
+}
+
 TEST_F(Cli, WrongUsageIsTwo) {
     const std::pair<const char*, const char*> cases[] = {
         {"rendr x -o a.png", "did you mean `kiln render`?"},
@@ -147,8 +153,8 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
 }
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
-    for (const char* verb :
-         {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema", "doctor", "compare", "bench"}) {
+    for (const char* verb : {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema",
+                             "doctor", "compare", "bench"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;
         EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;

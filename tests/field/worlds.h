@@ -174,6 +174,25 @@ inline World thin_walls() {
     return w;
 }
 
+/// Formulas: alone, in a cut, blended, scaled, and one with branches enough to prune.
+inline World formulas() {
+    World w{"formulas", {}, {.voxel_size = 0.05f, .bounds = {{-1.6f, -1.5f, -1.7f}, {1.5f, 1.6f, 1.5f}}}};
+    w.edits.push_back(edit(Expression{.expression = "length(p) - 0.8 - 0.1*sin(8*x)*cos(5*y)"}));
+    w.edits.push_back(
+        edit(Expression{.expression = "s = 7; max(abs(dot(sin(s*p), cos(s*p.yzx))/s) - 0.04, length(p) - 0.5)",
+                        .half_extents = {0.6f, 0.6f, 0.6f}},
+             {0.6f, 0.5f, 0}, Op::Union, 0.05f));
+    w.edits.back().node.material = MaterialId{2, 0};
+    std::string drops = "1";
+    for (int i = 0; i < 24; ++i)
+        drops = "min(" + drops + ", length(p - vec3(" + std::to_string(0.06 * i - 0.7) + ", " +
+                std::to_string(0.5 * ((i * 7) % 5) - 1) + "*0.5, 0)) - 0.06)";
+    Edit cut = edit(Expression{.expression = drops}, {0, 0, 0.7f}, Op::Subtract, 0.03f);
+    cut.node.transform.scale = {1, 0.8f, 1.2f};
+    w.edits.push_back(cut);
+    return w;
+}
+
 inline World boxes() {
     World w{"boxes", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}}};
     w.edits.push_back(
@@ -195,6 +214,8 @@ inline World blends() {
     return w;
 }
 
-inline std::vector<World> all() { return {sphere_of(10), boxes(), blends(), thin_walls(), jumble(7), jumble(11, 60)}; }
+inline std::vector<World> all() {
+    return {sphere_of(10), boxes(), blends(), thin_walls(), jumble(7), jumble(11, 60), formulas()};
+}
 
 }  // namespace kiln::field::worlds

@@ -70,6 +70,53 @@ TEST_F(BakeGpu, MeshesAreReadAsTheCpuReadsThem) {
         expect_same(*runner_, w, baker, field::DistanceFormat::Half);
 }
 
+// Thirty values that stay alive to the end: more than there are registers.
+std::string many_alive() {
+    std::string names, value = "0", mirror = "0";
+    for (int i = 0; i < 30; ++i) {
+        names += "a" + std::to_string(i) + " = sin(" + std::to_string(i + 1) + "*x + y);";
+        value = "(" + value + " + a" + std::to_string(i) + "*z)";
+        mirror = "max(" + mirror + ", a" + std::to_string(29 - i) + ")";
+    }
+    return names + "length(p) - 0.4 + 0.01*" + value + " - 0.02*" + mirror;
+}
+
+TEST_F(BakeGpu, FormulasAreTheCpusOwn) {
+    field::worlds::World world{
+        "formulas", {}, {.voxel_size = 0.04f, .bounds = {{-1.2f, -1.2f, -1.2f}, {1.2f, 1.2f, 1.2f}}}};
+    world.edits.push_back(field::worlds::edit(Expression{.expression = "length(p) - 0.8 - 0.1*sin(8*x)*cos(5*y)"}));
+    world.edits.push_back(field::worlds::edit(
+        Expression{
+            .expression = "max(atan2(y, x + 3), exp(z) - 1.2) + log(2 + x^2) - 0.9 + mod(0*x + 0.3, 0.2) + floor(0.5)",
+            .half_extents = {0.6f, 0.6f, 0.6f}},
+        {0.4f, 0.2f, 0.1f}, Op::Subtract, 0.1f));
+    expect_same(*runner_, world, Baker::Storage, field::DistanceFormat::Half);
+    expect_same(*runner_, world, Baker::Copy, field::DistanceFormat::Snorm8);
+}
+
+TEST_F(BakeGpu, BricksTheGpuCannotRunAreTheCpusAndCounted) {
+    field::worlds::World world{
+        "mixed", {}, {.voxel_size = 0.03f, .bounds = {{-0.6f, -0.6f, -0.6f}, {2.2f, 0.6f, 0.6f}}}};
+    world.edits.push_back(
+        field::worlds::edit(Expression{.expression = many_alive(), .half_extents = {0.5f, 0.5f, 0.5f}}));
+    world.edits.push_back(field::worlds::edit(Sphere{.radius = 0.4f}, {1.6f, 0, 0}));
+    for (const Baker baker : {Baker::Storage, Baker::Copy}) {
+        expect_same(*runner_, world, baker, field::DistanceFormat::Half);
+        GpuField gpu(*runner_);
+        const auto f = world.field();
+        rhi::must(gpu.update(f, baker));
+        EXPECT_GT(gpu.bricks_on_host(), f->stats().bricks / 4);
+        EXPECT_LT(gpu.bricks_on_host(), f->stats().bricks * 3 / 4);
+        EXPECT_EQ(gpu.bricks_baked(), f->stats().bricks);
+    }
+    const auto renderer = renderer_or_skip();
+    if (!renderer) return;
+    const auto refused = renderer->render(frame_of(world), {.width = 16, .height = 16, .analytic = true});
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("draw it from bricks"), std::string::npos);
+    EXPECT_TRUE(renderer->render(frame_of(world), {.width = 16, .height = 16}));
+}
+
 TEST_F(BakeGpu, MoreThanSixteenMaterialsKeepTheHeaviest) {
     field::worlds::World world{"many", {}, {.voxel_size = 0.2f, .bounds = {{-1, -1, -1}, {2, 2, 2}}}};
     for (int i = 0; i < 30; ++i) {

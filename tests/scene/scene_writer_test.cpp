@@ -117,7 +117,8 @@ RC_GTEST_PROP(SceneWriter, AnyEditReadsBackAsItself, (uint32_t seed)) {
     edit.name = "e";
     do {
         edit.node.shape.kind = uint16_t(unit() * float(sdf::shape_rows().size()));
-    } while (sdf::shape_rows()[edit.node.shape.kind].how == sdf::KindRow::Sampled);
+    } while (sdf::shape_rows()[edit.node.shape.kind].how == sdf::KindRow::Sampled ||
+             sdf::shape_rows()[edit.node.shape.kind].how == sdf::KindRow::Formula);
     fill(sdf::shape_rows()[edit.node.shape.kind], edit.node.shape.params);
     edit.node.transform.position = {unit(), -unit(), unit() * 100};
     edit.node.transform.rotation = axis_angle({0, 1, 0}, unit());

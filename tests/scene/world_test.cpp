@@ -301,6 +301,52 @@ TEST(World, ImportMakesASceneThatNamesItsModel) {
     fs::remove_all(folder);
 }
 
+TEST(World, AModelIsReadOnceBesideItsSceneAndItsFaultsNameTheFile) {
+    const std::string folder = testing::TempDir();
+    std::ofstream(folder + "/ball.vm")
+        << "_0 var-x\n_1 var-y\n_2 var-z\n_3 square _0\n_4 square _1\n_5 square _2\n_6 add _3 _4\n"
+           "_7 add _6 _5\n_8 sqrt _7\n_9 const 1\n_a sub _8 _9\n";
+    const std::string ball =
+        "{\"id\": \"ball\", \"shape\": \"expression\", \"file\": \"ball.vm\", \"half_extents\": [1.25, 1.25, 1.25]}";
+    std::ofstream(folder + "/ball.kiln.json") << scene_with(ball);
+    const auto world = World::load(folder + "/ball.kiln.json");
+    ASSERT_TRUE(world) << world.error().message;
+    EXPECT_NEAR(world->distance({1.1f, 0, 0}), 0.1f, 1e-3f);
+    EXPECT_NEAR(world->distance({0, 0, 0.5f}), -0.5f, 5e-3f);
+    EXPECT_NE(world->to_json().find("\"file\": \"ball.vm\""), std::string::npos) << world->to_json();
+    std::ofstream(folder + "/bad.vm") << "_0 var-x\n_1 frob _0\n";
+    std::ofstream(folder + "/bad.kiln.json") << scene_with("{\"shape\": \"expression\", \"file\": \"bad.vm\"}");
+    const auto bad = World::load(folder + "/bad.kiln.json");
+    ASSERT_FALSE(bad);
+    EXPECT_THAT(bad.error().message, testing::StartsWith(folder + "/bad.kiln.json:1:"));
+    EXPECT_THAT(bad.error().message, testing::HasSubstr("edits[0].file: model 2:4: there is no operation \"frob\""));
+    std::ofstream(folder + "/none.kiln.json") << scene_with("{\"shape\": \"expression\", \"file\": \"none.vm\"}");
+    const auto none = World::load(folder + "/none.kiln.json");
+    ASSERT_FALSE(none);
+    EXPECT_THAT(none.error().message, testing::HasSubstr("none.vm: cannot be read"));
+}
+
+TEST(World, ExpressionsAreWrittenAsTheyWereRead) {
+    const std::string edit =
+        "{\"shape\": \"expression\", \"expression\": \"r = length(p.xz);\\n max(r - 0.5, abs(y) - 0.25)\", "
+        "\"lipschitz\": 1}";
+    const auto world = World::parse(scene_with(edit), "s.json");
+    ASSERT_TRUE(world) << world.error().message;
+    const auto again = World::parse(world->to_json(), "s.json");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->to_json(), world->to_json());
+    EXPECT_EQ(*again->find(again->edits()[0]), *world->find(world->edits()[0]));
+    // And from code.
+    World made;
+    ASSERT_TRUE(made.add({.name = "e", .node = {.shape = Expression{.expression = "length(p) - 0.5"}}}));
+    const auto read = World::parse(made.to_json(), "s.json");
+    ASSERT_TRUE(read) << read.error().message << made.to_json();
+    EXPECT_EQ(read->distance({0.75f, 0, 0}), made.distance({0.75f, 0, 0}));
+    const auto refused = made.add({.name = "f", .node = {.shape = Expression{.expression = "length(p"}}});
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("f: expression 1:1: this bracket is not closed"));
+}
+
 TEST(World, NearestWord) {
     const std::string_view known[] = {"union", "subtract", "intersect", "paint"};
     EXPECT_EQ(nearest_word("substract", known), "subtract");

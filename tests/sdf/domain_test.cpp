@@ -36,7 +36,8 @@ struct Bare {
                 for (int i = 0; i < f.arity; ++i) w[size_t(f.offset + i)] = std::min(w[size_t(f.offset + i)], 1.0f);
             }
             bounds = text32::shape_bounds(kind, w.data());
-        } while (shape_rows()[kind].how == KindRow::Sampled || !std::isfinite(bounds.lo.x));
+        } while (shape_rows()[kind].how == KindRow::Sampled || shape_rows()[kind].how == KindRow::Formula ||
+                 !std::isfinite(bounds.lo.x));
     }
     double at(text64::real3 p) const { return text64::shape_distance(kind, p, w.data(), {samples_of(kind)}); }
 };

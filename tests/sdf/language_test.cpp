@@ -32,6 +32,26 @@ TEST(Language, ArcTangentIsWithinItsStatedErrorInEveryQuadrant) {
     EXPECT_NEAR(text32::atan_of(-1.0f, 0.0f), -M_PI / 2, 4e-7);
 }
 
+TEST(Language, ExponentialAndLogarithmAreWithinTheirStatedErrorAndCutOffOutside) {
+    double worst_exp = 0, worst_log = 0;
+    Random random(3);
+    for (int i = 0; i < 400000; ++i) {
+        const float x = float(i % 2 == 0 ? random.in(-87, 88) : random.in(-1, 1));
+        worst_exp = std::max(worst_exp, std::fabs(double(text32::exp_of(x)) / std::exp(double(x)) - 1));
+        const float y = float(i % 2 == 0 ? std::pow(10, random.in(-36, 37)) : random.in(0.5, 2));
+        const double log = std::log(double(y));
+        worst_log = std::max(worst_log, std::fabs(double(text32::log_of(y)) - log) / (1 + std::fabs(log)));
+    }
+    EXPECT_LT(worst_exp, 2e-7);
+    EXPECT_LT(worst_log, 1e-7);
+    EXPECT_EQ(text32::exp_of(-1e9f), text32::exp_of(-87.0f));
+    EXPECT_EQ(text32::exp_of(1e9f), text32::exp_of(88.0f));
+    EXPECT_EQ(text32::log_of(0.0f), text32::log_of(1e-37f));
+    EXPECT_EQ(text32::log_of(-5.0f), text32::log_of(1e-37f));
+    EXPECT_EQ(text32::log_of(1.0f), 0.0f);
+    EXPECT_EQ(text32::exp_of(0.0f), 1.0f);
+}
+
 TEST(Language, MinAndMaxKeepTheirFirstOperandInATie) {
     EXPECT_TRUE(std::signbit(text32::min(-0.0f, 0.0f)));
     EXPECT_FALSE(std::signbit(text32::min(0.0f, -0.0f)));

@@ -34,6 +34,8 @@ namespace kiln::sdf::text32 {
 #define KILN_T real
 #include "sdf/lang/trig.sdf.h"
 #undef KILN_T
+#include "sdf/lang/explog.sdf.h"
+
 #include "sdf/texts.gen.inl"
 #undef KILN_SCALAR
 #undef KILN_SDF

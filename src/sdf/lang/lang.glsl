@@ -22,5 +22,7 @@
 #define select(m, a, b) ((m) ? (a) : (b))
 #define whole_of(a) uint(int(a))
 #define real_of(a) float(a)
+#define bits_of(a) floatBitsToUint(a)
+#define real_of_bits(a) uintBitsToFloat(a)
 #define Samples uint
 #define sample_at(s, index) sdf_sample((s) + (index))

@@ -69,6 +69,8 @@ KILN_SDF real length(real3 a) { return sqrt(dot(a, a)); }
 
 KILN_SDF whole whole_of(real floored) { return uint32_t(int32_t(floored)); }
 KILN_SDF real real_of(whole a) { return real(a); }
+KILN_SDF whole bits_of(float a) { return __builtin_bit_cast(whole, a); }
+KILN_SDF float real_of_bits(whole a) { return __builtin_bit_cast(float, a); }
 
 /// Numbers of sampled shapes (heightfields): one flat array for the whole program.
 struct Samples {

@@ -75,6 +75,8 @@ KILN_SDF whole whole_of(real a) { return lane_u(_mm_cvttps_epi32(__m128(a.v))); 
 #endif
 KILN_SDF real abs(real a) { return lane_f(lane_i(a.v) & 0x7fffffff); }
 KILN_SDF real clamp(real x, real lo, real hi) { return min(max(x, lo), hi); }
+KILN_SDF whole bits_of(real a) { return lane_u(a.v); }
+KILN_SDF real real_of_bits(whole a) { return lane_f(a.v); }
 KILN_SDF real real_of(whole a) { return __builtin_convertvector(lane_i(a.v), lane_f); }
 
 // The same functions of parameters, which are equal in every lane.

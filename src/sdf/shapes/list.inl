@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Every primitive, one line each: KILN_SHAPE(Type, name, how). `shapes/<name>.sdf.h` holds the rest.
-// how: Exact (true distance outside the solid), Bound (1-Lipschitz lower bound), Sampled (also reads the program's samples).
+// how: Exact (true distance outside the solid), Bound (1-Lipschitz lower bound), Sampled (also reads the program's samples),
+// Formula (no distance text: compiled from Shape::data).
 // Files store names, so the order is free.
 KILN_SHAPE(Sphere, sphere, Exact)
 KILN_SHAPE(Box, box, Exact)
@@ -25,3 +26,4 @@ KILN_SHAPE(SolidAngle, solid_angle, Exact)
 KILN_SHAPE(Vesica, vesica, Exact)
 KILN_SHAPE(Heightfield, heightfield, Sampled)
 KILN_SHAPE(SampledMesh, mesh, Sampled)
+KILN_SHAPE(Expression, expression, Formula)

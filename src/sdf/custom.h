@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: MIT
+// Shapes that a program brings itself (kiln/custom_shape.h): their rows, and calls of their functions.
+#pragma once
+
+#include "sdf/tables.h"
+
+#include <kiln/custom_shape.h>
+#include <kiln/math.h>
+
+namespace kiln::sdf {
+
+inline constexpr int kMostCustomShapes = 256;  // an instruction's aux
+
+/// Built-in rows, then those of registered shapes; grows, and what was seen stays.
+std::span<const KindRow> rows_with_custom(std::span<const KindRow> built_in);
+
+/// Its number in instructions.
+uint32_t custom_index(uint16_t kind);
+/// NaN everywhere when the function throws. Any thread.
+void custom_distances(uint32_t index, const float* params, const CustomShape::Points& points, double* out);
+
+struct CustomBounds {
+    vec3 half_extents;
+    float lipschitz = 1;
+};
+/// What the shape says of itself, checked by sampling; answers are kept. Any thread.
+Result<CustomBounds> check_custom(const Shape& shape);
+
+}  // namespace kiln::sdf
