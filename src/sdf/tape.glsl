@@ -145,9 +145,6 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             case kOpPointClamp:
                 if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
                 break;
-            case kOpPointClamp:
-                if (KILN_USES_OPCODE(kOpPointClamp)) p = clamp(p, tape_vec3(at), tape_vec3(at + 3u));
-                break;
             case kOpShape:
                 value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);
 #ifdef KILN_TAPE_MATERIALS
