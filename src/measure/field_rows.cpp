@@ -414,7 +414,7 @@ private:
         run_.add_checked(row_out, checksum_of(out), checksum_of(one_by_one(bricks, points)));
     }
 
-    // One point a call, each by itself; the slow way goes through samples of eight corners.
+    // One point a call, each by itself; the slow way is the narrowest of the wide loops, which shares no code with it.
     void single() {
         run_.stage("query.single");
         const HostBricks& bricks = start();
