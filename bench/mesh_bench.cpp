@@ -3,7 +3,7 @@
 // Peers on kind 0: OpenVDB's volumeToMesh 6.6 Mtri/s (vertices off by rms 0.075, at most 0.62 voxel), libfive's dual
 // contouring 0.35 Mtri/s (rms 0.025, at most 2.5 to 17 voxels).
 
-#include "bench/recipes.h"
+#include "measure/recipes.h"
 #include "field/meshing.h"
 #include "sdf/eval.h"
 
@@ -19,7 +19,7 @@ field::HostBricks bricks_of(int kind) {
     options.voxel_size = 2.0f / 256;
     options.bounds = {{-1, -1, -1}, {1, 1, 1}};
     options.workers = 1;
-    const std::vector<Edit> edits = recipe(kind, 5, 1000);
+    const std::vector<Edit> edits = measure::recipe(kind, 5, 1000);
     return *field::HostBricks::build(std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}})), options);
 }
 

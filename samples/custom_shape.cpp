@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A program's own shape: its distance in C++, its numbers as parameters, used like any other shape in code and in scene files.
 
-#include <kiln/custom_shape.h>
+#include <kiln/edit.h>
 #include <kiln/world.h>
 
 #include <cmath>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT
-// Shapes that a program brings itself (kiln/custom_shape.h): their rows, and calls of their functions.
+// Shapes that a program brings itself (kiln/edit.h): their rows, and calls of their functions.
 #pragma once
 
 #include "sdf/tables.h"
 
-#include <kiln/custom_shape.h>
+#include <kiln/edit.h>
 #include <kiln/math.h>
 
 namespace kiln::sdf {

@@ -12,7 +12,7 @@ namespace kiln::sdf {
 namespace {
 
 constexpr double kHalfDiagonal = 1.7320509;
-constexpr int kMostCubes = 400000;  // about a second; only surfaces that are everywhere equally near need so many
+constexpr int kMostCubes = 1600000;  // about a second; only surfaces that are everywhere equally near need so many
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 dvec3 operator+(dvec3 a, dvec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }

@@ -48,7 +48,7 @@ struct KindRow {
     }
 };
 
-/// Shape rows, indexed by Shape::kind: primitives first, then composites, then what the program has registered (custom_shape.h).
+/// Shape rows, indexed by Shape::kind: primitives first, then composites, then what the program has registered (kiln/edit.h).
 std::span<const KindRow> shape_rows();
 /// Warp rows, indexed by Warp::kind.
 std::span<const KindRow> warp_rows();

@@ -5,6 +5,7 @@
 
 #include "worlds.h"
 
+#include "sdf/mesh_grid.h"
 #include "sdf/tables.h"
 
 namespace kiln::field::worlds {
@@ -36,7 +37,7 @@ inline FieldOptions around(vec3 half, float h = 0.04f, vec3 center = {}) {
 
 // Every primitive with its default numbers, side by side, each turned its own way.
 inline World every_shape() {
-    World w{"every shape", {}, around({1.4f, 0.35f, 1.4f}), {hills()}};
+    World w{"every shape", {}, around({1.4f, 0.35f, 1.4f}), {hills()}, {sdf::ball_grid()}};
     const int count = sdf::primitive_count();
     for (int kind = 0; kind < count; ++kind) {
         Shape shape;
@@ -47,8 +48,9 @@ inline World every_shape() {
             for (int i = 0; i < f.arity; ++i) shape.params[size_t(f.offset + i)] = f.defaults[size_t(i)];
         }
         if (row.how == sdf::KindRow::Sampled) shape.data = "0";
+        if (row.how == sdf::KindRow::Formula) shape.data = "length(p) - 0.5 - 0.05*sin(9*x)";
         Edit e = edit(shape, {-1.1f + 0.55f * float(kind % 5), 0, -1.1f + 0.55f * float(kind / 5)});
-        const float s = row.how == sdf::KindRow::Sampled ? 0.04f : 0.4f;
+        const float s = row.name == "heightfield" ? 0.04f : 0.4f;
         w.edits.push_back(
             of_material(scaled(turned(e, {1, 2, 0.5f}, 0.3f * float(kind)), {s, s, s}), uint32_t(kind) % 7));
     }

@@ -17,7 +17,8 @@ struct Scene {
     std::vector<Edit> edits{Edit{}};
     std::vector<Object> objects;
     HeightGrid grid{kGridSide, kGridSide, {std::begin(kGrid), std::end(kGrid)}};
-    Source source() const { return {edits, objects, {&grid, 1}}; }
+    MeshGrid mesh = ball_grid();
+    Source source() const { return {.edits = edits, .objects = objects, .grids = {&grid, 1}, .meshes = {&mesh, 1}}; }
     Node& node() { return edits[0].node; }
 };
 
