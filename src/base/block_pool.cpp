@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Sizes are classes of 64 bytes up to kLargest; larger blocks come from the heap. A thread keeps at most two batches of each class.
+// Sizes are classes of 64 bytes up to kLargest; larger blocks come from the heap. A thread keeps at most two batches of each class, and
+// what is left of the slab that it took last. Slabs of larger classes are huge pages where the system has them: bricks are read all over.
 
 #include "base/block_pool.h"
 
@@ -8,6 +9,9 @@
 #include <mutex>
 #include <new>
 #include <vector>
+#if defined(__linux__)
+#include <sys/mman.h>
+#endif
 
 namespace kiln {
 namespace {
@@ -16,7 +20,19 @@ constexpr size_t kStep = 64;
 constexpr size_t kLargest = 4096;
 constexpr size_t kClasses = kLargest / kStep;
 constexpr size_t kBatch = 64;
-constexpr size_t kSlabBytes = 64 << 10;
+constexpr size_t kSlabBytes = 64 << 10, kHugeBytes = 2 << 20;
+constexpr size_t kHugeFrom = 512 / kStep;  // the first class whose slabs are huge
+
+constexpr size_t slab_bytes(size_t c) { return c >= kHugeFrom ? kHugeBytes : kSlabBytes; }
+
+std::byte* take_slab(size_t c) {
+    if (c < kHugeFrom) return static_cast<std::byte*>(::operator new(kSlabBytes));
+    void* const slab = ::operator new(kHugeBytes, std::align_val_t(kHugeBytes));
+#if defined(__linux__)
+    (void)madvise(slab, kHugeBytes, MADV_HUGEPAGE);  // a wish: small pages do as well
+#endif
+    return static_cast<std::byte*>(slab);
+}
 
 // Under sanitizers every block is the heap's own, so that a use after its end is seen.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -58,8 +74,8 @@ struct Cache {
             from.resize(from.size() - n);
         }
         if (!free[c].empty()) return;
-        const size_t bytes = (c + 1) * kStep, count = std::max<size_t>(kSlabBytes / bytes, 1);
-        auto* const slab = static_cast<std::byte*>(::operator new(count* bytes));
+        const size_t bytes = (c + 1) * kStep, count = slab_bytes(c) / bytes;
+        std::byte* const slab = take_slab(c);
         for (size_t i = count; i-- > 0;) free[c].push_back(slab + i * bytes);
     }
 
@@ -92,7 +108,7 @@ void give_block(void* block, size_t bytes) {
     }
     const size_t c = (bytes - 1) / kStep;
     cache.free[c].push_back(block);
-    if (cache.free[c].size() >= 2 * kBatch + kSlabBytes / ((c + 1) * kStep)) cache.spill(c);
+    if (cache.free[c].size() >= 2 * kBatch + slab_bytes(c) / ((c + 1) * kStep)) cache.spill(c);
 }
 
 }  // namespace kiln

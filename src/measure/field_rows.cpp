@@ -12,8 +12,10 @@
 #include "measure/slow.h"
 
 #include "base/parallel_for.h"
+#include "field/cell_cases.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
+#include "field/meshing.h"
 #include "sdf/program.h"
 
 #include <algorithm>
@@ -113,6 +115,8 @@ private:
         if (wanted("samples.band")) samples("samples.band", wide_start(), band_points(), 39, threads);
         if (wanted("query.single") && threads == 1) single();
         if (wanted("rays")) rays(threads);
+        if (wanted("mesh.smooth")) mesh(false, threads);
+        if (wanted("mesh.sharp")) mesh(true, threads);
     }
 
     BenchRow row(std::string name, double value, std::string unit, int threads, bool more_is_better = false) const {
@@ -501,6 +505,57 @@ private:
         run_.add_checked(out, checksum_of(hits), checksum_of(slow_way));
     }
 
+    // Triangles of the smooth mesh and crossed lattice edges, each counted voxel by voxel. An edge is in four voxels, none of which lacks its
+    // brick: these scenes end inside the grid.
+    static std::pair<uint64_t, uint64_t> crossings(const HostBricks& bricks) {
+        uint64_t triangles = 0, edges = 0;
+        for (const uint32_t slot : bricks.field().slots()) {
+            for (int i = 0; i < 343; ++i) {
+                const int x = i % 7, y = i / 7 % 7, z = i / 49;
+                uint32_t solid = 0;
+                for (int c = 0; c < 8; ++c)
+                    solid |= uint32_t(bricks.texel(slot, x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) <= 0) << c;
+                const field::CellLoops& loops = field::cell_tables().loops[solid];
+                triangles += field::cell_tables().triangles[solid].count;
+                edges += loops.first[loops.count];
+            }
+        }
+        return {triangles, edges / 4};
+    }
+
+    void mesh(bool sharp, int threads) {
+        run_.stage("meshes");
+        const HostBricks& bricks = start();
+        const field::MeshBricks mesh_bricks(bricks);
+        field::Mesh made;
+        std::vector<Contestant> turns{[&] {
+            return seconds_of([&] {
+                if (sharp) {
+                    field::mesh_sharp(mesh_bricks, field::exact_of(bricks, mesh_bricks), made, threads);
+                } else {
+                    field::mesh_smooth(mesh_bricks, made, threads);
+                }
+            });
+        }};
+        uint64_t peer_triangles = 0;
+        if (threads == 1 && peer_grid() != nullptr)
+            turns.push_back([&] { return seconds_of([&] { peer_triangles = peers()->mesh(peer_grid(), threads); }); });
+        const std::vector<double> least = least_seconds(run_.options.runs, turns);
+        BenchRow out = row(sharp ? "mesh.sharp" : "mesh.smooth", double(made.triangle_count()) / least[0] / 1e6,
+                           "Mtri/s", threads, true);
+        if (least.size() > 1) {
+            compare(out, peers()->tree_name, double(peer_triangles) / least[1] / 1e6);
+        } else {
+            anchor(out, sharp ? "libfive" : "OpenVDB", sharp ? 0.35 : 6.6);
+        }
+        constexpr double kVertexFlops = 20;  // operations that place a vertex on its edge
+        out.roof_ratio = kVertexFlops * double(made.vertex_count()) / (roofs().flops * threads) / least[0];
+        // Two triangles a crossed edge, or a vertex each.
+        const auto [triangles, edges] = crossings(bricks);
+        run_.add_checked(out, hash_combine(made.triangle_count(), sharp ? 0 : made.vertex_count()),
+                         sharp ? hash_combine(2 * edges, 0) : hash_combine(triangles, edges));
+    }
+
     void memory() {
         run_.stage("memory");
         const HostBricks& bricks = start();
@@ -532,14 +587,15 @@ private:
 }  // namespace
 
 BenchFamily field_family() {
-    return {{"field",
-             "the field of 1000 spheres and boxes: building, editing, sampling, rays, memory",
-             {"bake", "edit.mean", "edit.worst", "undo", "edit.add", "edit.smooth", "edit.move", "edit.remove",
-              "samples.random", "samples.band", "query.single", "rays", "memory.per_voxel"}},
-            [](BenchRun& run) {
-                for (const int kind : run.options.kinds)
-                    if (!run.fault()) FieldRows(run, kind).all();
-            }};
+    return {
+        {"field",
+         "the field of 1000 spheres and boxes: building, editing, sampling, rays, meshes, memory",
+         {"bake", "edit.mean", "edit.worst", "undo", "edit.add", "edit.smooth", "edit.move", "edit.remove",
+          "samples.random", "samples.band", "query.single", "rays", "mesh.smooth", "mesh.sharp", "memory.per_voxel"}},
+        [](BenchRun& run) {
+            for (const int kind : run.options.kinds)
+                if (!run.fault()) FieldRows(run, kind).all();
+        }};
 }
 
 }  // namespace kiln::measure
