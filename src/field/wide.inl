@@ -105,7 +105,8 @@ static inline void locate(const WideView& view, F3 p, Located& out) {
     const Place x = place_of(p.x, inverse, g.cell_x, g.size_x), y = place_of(p.y, inverse, g.cell_y, g.size_y),
                 z = place_of(p.z, inverse, g.cell_z, g.size_z);
     out.inside = both(both(x.inside, y.inside), z.inside);
-    const I index = select(out.inside, cell_index(g, {to_int(x.cell), to_int(y.cell), to_int(z.cell)}), splat(0));
+    const auto held = [&](F cell) { return select(out.inside, to_int(cell), splat(0)); };  // before they are multiplied
+    const I index = cell_index(g, {held(x.cell), held(y.cell), held(z.cell)});
     const I word = gather(view.cells, index);
     out.occupied = both(out.inside, lt(word, splat(0)));
     out.brick = gather_pointers(view.bricks, select(out.occupied, word & int32_t(kCellSlotMask), splat(0)));
