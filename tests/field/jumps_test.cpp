@@ -40,6 +40,10 @@ int brute_jump(const Grid& g, int x, int y, int z) {
 TEST(Jumps, AreTheChebyshevDistanceToTheNearestBrick) {
     for (const int occupied : {0, 1, 3, 40}) {
         Grid g = random_grid(uint32_t(occupied), {occupied == 3 ? 83 : 17, 12, 23}, occupied);
+        if (occupied == 3) {  // near the 64th cell of a row, from both sides
+            g.cells.set(62, 2, 3, kCellOccupied | 90u);
+            g.cells.set(66, 9, 19, kCellOccupied | 91u);
+        }
         const Grid before = g;
         update_jumps(g.cells, {{0, 0, 0}, g.size});
         for (int z = 0; z < g.size.z; ++z) {
