@@ -120,6 +120,37 @@ TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
         << "old snapshots stay";
 }
 
+TEST(World, ReorderMovesAnEditAndTheFieldFollows) {
+    World world;
+    world.field_settings = {
+        .voxel_size = 0.1f, .cells = 64, .levels = 1, .bounds = Box3{{-2, -2, -2}, {2, 2, 2}}, .distance_8bit = false};
+    const auto a = world.add(ball(1));
+    Edit hole = ball(0.5f);
+    hole.op = Op::Subtract;
+    const auto cut = world.add(hole);
+    const auto plug = world.add(ball(0.2f));
+    ASSERT_TRUE(a && cut && plug && world.frame());
+    EXPECT_LT(world.distance({0, 0, 0}), 0) << "the plug comes after the cut";
+    ASSERT_TRUE(world.reorder(*cut, {}));
+    EXPECT_EQ(world.edits(), (std::vector<EditId>{*a, *plug, *cut}));
+    EXPECT_GT(world.distance({0, 0, 0}), 0);
+    EXPECT_GT(world.sample({0, 0.3f, 0}, FieldSource::Bricks).distance, 0);
+    // Each goes between the ball and the other, in half the room that was left; then the list is numbered anew.
+    for (int i = 0; i < 50; ++i) {
+        ASSERT_TRUE(world.reorder(*cut, *plug));
+        ASSERT_LT(world.distance({0, 0, 0}), 0) << i;
+        ASSERT_TRUE(world.reorder(*plug, *cut));
+        ASSERT_GT(world.distance({0, 0, 0}), 0) << i;
+    }
+    ASSERT_TRUE(world.reorder(*plug, {}));
+    EXPECT_EQ(world.edits(), (std::vector<EditId>{*a, *cut, *plug}));
+    EXPECT_LT(world.distance({0, 0, 0}), 0);
+    EXPECT_LT(world.sample({0, 0, 0.15f}, FieldSource::Bricks).distance, 0);
+    ASSERT_TRUE(world.remove(*plug));
+    EXPECT_FALSE(world.reorder(*plug, *a));
+    EXPECT_FALSE(world.reorder(*a, *plug));
+}
+
 TEST(World, TooLargeForThePoolIsCoarserAndSaysSo) {
     World world;
     world.field_settings.voxel_size = 0.001f;
