@@ -46,6 +46,7 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     s.analytic = o.analytic;
     s.unpruned = o.unpruned;
     s.accelerate = !o.no_accelerate;
+    s.refine = !o.no_refine;
     s.atlas_by_copy = o.atlas_by_copy;
     return s;
 }

@@ -11,7 +11,8 @@ namespace kiln::cli {
 struct PictureOptions {
     std::string scene, output, camera, size = "1280x720", view = "shaded", device = "auto";
     int reference = 0;
-    bool analytic = false, unpruned = false, no_accelerate = false, atlas_by_copy = false, json = false, quiet = false;
+    bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, atlas_by_copy = false;
+    bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };
 

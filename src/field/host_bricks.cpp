@@ -31,6 +31,7 @@ struct Reader {
     }
     float field_texel(int slot, ivec3 texel) const { return bricks.texel(uint32_t(slot), texel.x, texel.y, texel.z); }
     Corners field_corners(int slot, ivec3 voxel) const { return bricks.corners(uint32_t(slot), voxel); }
+    static bool field_voxel_solid(int, ivec3) { return true; }
     uint field_material(int slot, ivec3 texel) const {
         return bricks.content(uint32_t(slot)).word(texel_at(texel.x, texel.y, texel.z));
     }

@@ -3,6 +3,7 @@
 // The includer provides the field, before this text (C++: as members of the struct that includes it):
 //     uint field_cell(ivec3 cell)                   cell word; `cell` counts from the grid's first cell and is inside
 //     Corners field_corners(int slot, ivec3 voxel)  stored values, in voxels, at the corners of voxel 0 … 6 of a brick
+//     bool field_voxel_solid(int slot, ivec3 voxel) may any of these be solid? (true, if one does not know)
 // Which voxels are looked at never changes what one of them answers, so a march with and without jumps finds the same hit.
 // In C++ this text is included inside a struct; it opens no namespace and includes nothing. Needs brick.gpu.h and cubic.gpu.h.
 
@@ -36,17 +37,19 @@ KILN_FN bool march_brick(BrickRay ray, int slot, float t_min, float t_max, KILN_
         float out_z = plane_crossing(voxel_exit_plane(voxel.z, up_z), ray.high.z, ray.low.z, ray.inverse.z, kFarVoxels);
         float out_any = min(min(out_x, out_y), out_z);
         float exit = max(min(out_any, leave), enter);
-        hit.voxels++;
-        Cubic cubic =
-            cubic_along(field_corners(slot, voxel), voxel_point(ray, voxel, enter), voxel_point(ray, voxel, exit));
-        float root = cubic_first_root(cubic);
-        if (root <= 1.0f) {
-            float s = enter + root * (exit - enter);
-            hit.t = ray.t_base + s;
-            hit.voxel = voxel;
-            vec3 p = voxel_point(ray, voxel, s);
-            hit.p = vec3(min(max(p.x, 0.0f), 1.0f), min(max(p.y, 0.0f), 1.0f), min(max(p.z, 0.0f), 1.0f));
-            return true;
+        if (field_voxel_solid(slot, voxel)) {
+            hit.voxels++;
+            Cubic cubic =
+                cubic_along(field_corners(slot, voxel), voxel_point(ray, voxel, enter), voxel_point(ray, voxel, exit));
+            float root = cubic_first_root(cubic);
+            if (root <= 1.0f) {
+                float s = enter + root * (exit - enter);
+                hit.t = ray.t_base + s;
+                hit.voxel = voxel;
+                vec3 p = voxel_point(ray, voxel, s);
+                hit.p = vec3(min(max(p.x, 0.0f), 1.0f), min(max(p.y, 0.0f), 1.0f), min(max(p.z, 0.0f), 1.0f));
+                return true;
+            }
         }
         if (out_any >= leave) return false;
         enter = exit;

@@ -13,6 +13,7 @@
 #include <kiln/shapes.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstring>
 
@@ -33,6 +34,20 @@ std::span<const std::byte> bytes_of(const T& range) {
 
 bool any_cpu_only(std::span<const sdf::Instruction> code) {
     return std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); });
+}
+
+// The mask of brick.gpu.h into a brick's table.
+void write_solid_mask(const field::BrickContent& brick, uint32_t* table) {
+    std::array<uint32_t, 64> rows{};
+    for (size_t texel = 0; texel < field::kBrickTexelCount; ++texel)
+        rows[texel / 8] |= uint32_t(brick.distance(texel) <= 0) << (texel % 8);
+    for (int z = 0; z < field::kBrickVoxels; ++z) {
+        for (int y = 0; y < field::kBrickVoxels; ++y) {
+            const size_t at = size_t(z) * 8 + size_t(y);
+            table[field::solid_mask_word(y, z)] |=
+                field::solid_voxels(rows[at], rows[at + 1], rows[at + 8], rows[at + 9]) << field::solid_mask_bit(0, y);
+        }
+    }
 }
 
 uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
@@ -160,10 +175,10 @@ void GpuField::drop_atlas() {
         device_->destroy(*t);
         *t = {};
     }
-    if (palettes_) {
-        runner_->forget(palettes_);
-        device_->destroy(palettes_);
-        palettes_ = {};
+    if (tables_) {
+        runner_->forget(tables_);
+        device_->destroy(tables_);
+        tables_ = {};
     }
 }
 
@@ -204,10 +219,10 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
          .label = "atlas materials"});
     if (!materials) return materials.error();
     materials_ = *materials;
-    auto palettes = device_->create_buffer(
-        {.size = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kPaletteSize * 4, .label = "palettes"});
-    if (!palettes) return palettes.error();
-    palettes_ = *palettes;
+    auto tables = device_->create_buffer(
+        {.size = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kBrickTableWords * 4, .label = "brick tables"});
+    if (!tables) return tables.error();
+    tables_ = *tables;
     format_ = format;
     baker_ = baker;
     return {};
@@ -275,12 +290,12 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     std::vector<sdf::Instruction> programs(tape.begin(), tape.end());
     program_count_ = uint32_t(programs.size());
     const std::vector<sdf::Instruction> outside = outside_code();
-    if (device_->info().kind == rhi::DeviceKind::Cpu) {
-        const TapeUse none{0, 0, 0, 1};
-        use_ = both(tape_use(programs), specialised_once_ ? use_ : none);
-        outside_use_ = both(tape_use(outside), specialised_once_ ? outside_use_ : none);
-        specialised_once_ = true;
-    }
+    const bool software = device_->info().kind == rhi::DeviceKind::Cpu;
+    const TapeUse inside = tape_use(programs), leaves = tape_use(outside), none{0, 0, 0, 1};
+    use_ = both(software ? inside : any_kind(inside), use_known_ ? use_ : none);
+    // Half-spaces are few kinds whatever the world: a kernel of its own on every device.
+    outside_use_ = both(software || outside_is_concave_ ? leaves : any_kind(leaves), use_known_ ? outside_use_ : none);
+    use_known_ = true;
     outside_count_ = uint32_t(outside.size());
     programs.insert(programs.end(), outside.begin(), outside.end());
 
@@ -370,7 +385,7 @@ Result<void> GpuField::bake(std::span<const uint32_t> slots) {
         bake_bricks(graph, f, slice, push, format_, by_copy, use_);
         graph.output(f.distances, rhi::Access::SampledReadCompute);
         graph.output(f.materials, rhi::Access::SampledReadCompute);
-        graph.output(f.palettes, rhi::Access::StorageReadCompute);
+        graph.output(f.tables, rhi::Access::StorageReadCompute);
         graph.output(f.dropped);
         auto submit = runner_->execute(graph);
         if (!submit) return submit.error();
@@ -391,7 +406,7 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
         const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
         std::vector<std::byte> codes(packed_bytes(slice.size(), 8 * code_bytes));
         std::vector<std::byte> words(packed_bytes(slice.size(), 16));
-        std::vector<uint32_t> palettes(slice.size() * field::kPaletteSize);
+        std::vector<uint32_t> tables(slice.size() * field::kBrickTableWords);
         parallel_for(int(slice.size()), field_->options().workers, [&](int i) {
             const size_t job = size_t(i);
             const field::BrickRecord& record = field_->records()[slice[job]];
@@ -406,15 +421,17 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
                 if (brick.materials)
                     std::memcpy(words.data() + packed_at(job, row, 16), brick.materials->words.data() + row * 8, 16);
             }
-            for (size_t entry = 0; entry < field::kPaletteSize; ++entry)
-                palettes[job * field::kPaletteSize + entry] = brick.palette(entry);
+            uint32_t* const table = tables.data() + job * field::kBrickTableWords;
+            for (size_t entry = 0; entry < field::kPaletteSize; ++entry) table[entry] = brick.palette(entry);
+            write_solid_mask(brick, table);
         });
-        // Palettes of slots that follow each other in one write.
+        // Tables of slots that follow each other in one write.
         for (size_t i = 0; i < slice.size();) {
             size_t n = 1;
             while (i + n < slice.size() && slice[i + n] == slice[i] + n) ++n;
-            const auto run = std::span(palettes).subspan(i * field::kPaletteSize, n * field::kPaletteSize);
-            if (auto r = device_->write_buffer(palettes_, uint64_t{slice[i]} * field::kPaletteSize * 4, bytes_of(run));
+            const auto run = std::span(tables).subspan(i * field::kBrickTableWords, n * field::kBrickTableWords);
+            if (auto r =
+                    device_->write_buffer(tables_, uint64_t{slice[i]} * field::kBrickTableWords * 4, bytes_of(run));
                 !r)
                 return r;
             i += n;
@@ -437,7 +454,7 @@ FieldHandles GpuField::import(Graph& graph) const {
     f.code = graph.import("code", code_.handle);
     f.program = graph.import("program", program_.handle);
     f.numbers = graph.import("numbers", numbers_.handle);
-    f.palettes = graph.import("palettes", palettes_);
+    f.tables = graph.import("brick tables", tables_);
     f.dropped = graph.import("dropped materials", dropped_);
     f.distances = graph.import("atlas distances", distances_);
     f.materials = graph.import("atlas materials", materials_);
@@ -474,14 +491,14 @@ Result<std::vector<GpuField::BrickTexels>> GpuField::read_back(std::span<const u
     FieldHandles f = import(graph);
     const Readback distances = graph.readback(f.distances);
     const Readback materials = graph.readback(f.materials);
-    const Readback palettes = graph.readback(f.palettes);
+    const Readback tables = graph.readback(f.tables);
     if (auto submit = runner_->execute(graph); !submit) return submit.error();
     auto codes = distances.get();
     if (!codes) return codes.error();
     auto words = materials.get_as<uint32_t>();
     if (!words) return words.error();
-    auto ids = palettes.get_as<uint32_t>();
-    if (!ids) return ids.error();
+    auto words_of_tables = tables.get_as<uint32_t>();
+    if (!words_of_tables) return words_of_tables.error();
     const uint32_t code_bytes = rhi::bytes_per_texel(format_);
     const size_t row = size_t{bricks_x_} * 8;
     const size_t plane = row * bricks_y_ * 8;
@@ -503,8 +520,9 @@ Result<std::vector<GpuField::BrickTexels>> GpuField::read_back(std::span<const u
                 }
             }
         }
-        const auto first = ids->begin() + ptrdiff_t(slot) * field::kPaletteSize;
+        const auto first = words_of_tables->begin() + ptrdiff_t(slot) * field::kBrickTableWords;
         brick.palette.assign(first, first + field::kPaletteSize);
+        brick.solid_mask.assign(first + field::kPaletteSize, first + field::kPaletteSize + field::kSolidMaskWords);
         out.push_back(std::move(brick));
     }
     return out;

@@ -14,7 +14,7 @@ namespace kiln::render {
 
 // The field's resources as one graph sees them.
 struct FieldHandles {
-    Buffer cells, records, code, program, palettes, dropped;
+    Buffer cells, records, code, program, tables, dropped;
     Buffer numbers;  // Program::samples, then Program::params
     Image distances, materials;
 };
@@ -45,7 +45,7 @@ public:
     bool leaves_grid() const { return outside_count_ != 0; }
     // Nothing but half-spaces, in unions, leaves the grid: along any ray the field there is a concave function.
     bool outside_is_concave() const { return outside_is_concave_; }
-    // What can occur on the tapes; everything, on GPUs. `outside`: on the tape of what leaves the grid alone.
+    // What kernels that run the tapes are made for. `outside`: on the tape of what leaves the grid alone.
     const TapeUse& use(bool outside) const { return outside ? outside_use_ : use_; }
     uint32_t params_first() const;   // in the numbers buffer
     uint32_t outside_first() const;  // in the program buffer
@@ -65,6 +65,7 @@ public:
     struct BrickTexels {
         std::vector<uint32_t> distance_codes, material_words;  // 512 each
         std::vector<uint32_t> palette;                         // 16
+        std::vector<uint32_t> solid_mask;                      // kSolidMaskWords
     };
     Result<std::vector<BrickTexels>> read_back(std::span<const uint32_t> slots);
 
@@ -98,7 +99,7 @@ private:
     std::shared_ptr<const field::Field> field_;
     Storage cells_, records_, code_, program_, numbers_;
     std::vector<sdf::Instruction> program_code_;
-    rhi::BufferHandle palettes_, dropped_;
+    rhi::BufferHandle tables_, dropped_;
     rhi::TextureHandle distances_, materials_;
     rhi::Format format_ = rhi::Format::Undefined;
     Baker baker_ = Baker::Auto;
@@ -106,7 +107,7 @@ private:
     uint32_t outside_count_ = 0, program_count_ = 0;
     bool outside_is_concave_ = false;
     TapeUse use_, outside_use_;
-    bool specialised_once_ = false;  // use_ only ever grows from there
+    bool use_known_ = false;  // both only ever grow from there
     uint32_t bricks_baked_ = 0, bricks_on_host_ = 0;
     double bake_ms_ = 0;
 };

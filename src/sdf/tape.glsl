@@ -6,7 +6,7 @@
 //   float sdf_param(uint at)     number `at` of Program::params
 //   float sdf_sample(uint at)    number `at` of Program::samples
 // Then: float tape_distance(uint first, uint count, vec3 p_world), or, with KILN_TAPE_MATERIALS defined,
-//       float tape_materials(uint first, uint count, vec3 p_world, out Mix mix).
+//       float tape_materials(uint first, uint count, vec3 p_world, bool wanted, out Mix mix): the mix where it is wanted.
 
 // It may define KILN_USES_SHAPE(kind), KILN_USES_WARP(kind), KILN_USES_OPCODE(opcode), KILN_TAPE_REGISTERS as specialisation constants
 // that say what can occur: software rasterisers execute the branches that no lane takes, too.
@@ -112,7 +112,7 @@ vec3 tape_affine(vec3 p, uint at) {
 }
 
 #ifdef KILN_TAPE_MATERIALS
-float tape_materials(uint first, uint count, vec3 p_world, out Mix mix_out) {
+float tape_materials(uint first, uint count, vec3 p_world, bool wanted, out Mix mix_out) {
     Mix mixes[KILN_TAPE_REGISTERS];
 #else
 float tape_distance(uint first, uint count, vec3 p_world) {
@@ -148,7 +148,7 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             case kOpShape:
                 value[dst] = shape_distance(aux, p, at + 3u, 0u) * sdf_param(at);
 #ifdef KILN_TAPE_MATERIALS
-                mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+                if (wanted) mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
 #endif
                 break;
             case kOpValue:
@@ -173,7 +173,7 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                     float number = value[a];
                     value[dst] = (abs(number) < kTapeEmpty ? number : kTapeEmpty) * sdf_param(at);
 #ifdef KILN_TAPE_MATERIALS
-                    mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+                    if (wanted) mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
 #endif
                 }
                 break;
@@ -189,8 +189,11 @@ float tape_distance(uint first, uint count, vec3 p_world) {
                 float x = value[a];
                 float y = value[b];
 #ifdef KILN_TAPE_MATERIALS
-                float share = op == kOpPaint ? share_min(0.0, y, sdf_param(at + 1u)) : op_share(op, x, y, sdf_param(at + 1u));
-                mixes[dst] = blend_mix(mixes[a], mixes[b], share);
+                if (wanted) {
+                    float k = sdf_param(at + 1u);
+                    float share = op == kOpPaint ? share_min(0.0, y, k) : op_share(op, x, y, k);
+                    mixes[dst] = blend_mix(mixes[a], mixes[b], share);
+                }
 #endif
                 value[dst] = op == kOpPaint ? x : op_distance(op, x, y, sdf_param(at));
                 break;
@@ -199,22 +202,22 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             case kOpNegate:
                 value[dst] = (word & 31u) == kOpNegate ? -value[a] : value[a];
 #ifdef KILN_TAPE_MATERIALS
-                mixes[dst] = mixes[a];
+                if (wanted) mixes[dst] = mixes[a];
 #endif
                 break;
             case kOpEmpty:
                 value[dst] = kTapeEmpty;
 #ifdef KILN_TAPE_MATERIALS
-                mixes[dst] = make_mix(float(kNoMaterial), float(kNoMaterial), 0.0);
+                if (wanted) mixes[dst] = make_mix(float(kNoMaterial), float(kNoMaterial), 0.0);
 #endif
                 break;
             case kOpTake:
                 if (!KILN_USES_OPCODE(kOpTake)) break;
                 value[dst] = aux == 1u ? -value[b] : value[b];
 #ifdef KILN_TAPE_MATERIALS
-                if (mixes[b].id0 == float(kNoMaterial)) {
+                if (wanted && mixes[b].id0 == float(kNoMaterial)) {
                     mixes[dst] = mixes[a];
-                } else {
+                } else if (wanted) {
                     mixes[dst] = mixes[b];
                 }
 #endif
@@ -222,14 +225,14 @@ float tape_distance(uint first, uint count, vec3 p_world) {
             case kOpConstant:
                 value[dst] = 0.0;
 #ifdef KILN_TAPE_MATERIALS
-                mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
+                if (wanted) mixes[dst] = make_mix(sdf_param(at + 1u), float(kNoMaterial), 0.0);
 #endif
                 break;
             default: break;
         }
     }
 #ifdef KILN_TAPE_MATERIALS
-    mix_out = mixes[0];
+    if (wanted) mix_out = mixes[0];
 #endif
     return value[0];
 }

@@ -14,7 +14,7 @@
 namespace kiln::render {
 
 struct BakeTally {
-    uint64_t texels = 0, inexact = 0, signs = 0, far = 0, words = 0;
+    uint64_t texels = 0, inexact = 0, signs = 0, far = 0, words = 0, masks = 0;
     double worst = 0;
 };
 
@@ -66,6 +66,18 @@ inline BakeTally compare_bake(GpuField& gpu, const field::Field& f) {
             if (std::fabs(d) > 3.99f) continue;
             tally.words += !same_mix(mix_of(read[i].material_words[t], palette), mix_of(expected.word(t), known));
         }
+        // The mask of voxels with a solid texel, by the texels read back.
+        for (int voxel = 0; voxel < 343; ++voxel) {
+            const int x = voxel % 7, y = voxel / 7 % 7, z = voxel / 49;
+            bool solid = false;
+            for (int corner = 0; corner < 8; ++corner) {
+                const size_t t = size_t((z + (corner >> 2)) * 64 + (y + (corner >> 1 & 1)) * 8 + x + (corner & 1));
+                const uint32_t code = read[i].distance_codes[t];
+                solid = solid || (half ? field::half_value(code) : field::snorm8_value(code)) <= 0;
+            }
+            const size_t word = size_t(field::solid_mask_word(y, z) - field::kPaletteSize);
+            tally.masks += (read[i].solid_mask[word] >> field::solid_mask_bit(x, y) & 1u) != uint32_t(solid);
+        }
     }
     return tally;
 }
@@ -75,6 +87,7 @@ inline void expect_same_texels(GpuField& gpu, const field::Field& f, const std::
     EXPECT_GT(tally.texels, 2000u) << name;
     EXPECT_EQ(tally.far, 0u) << name << ": of " << tally.texels << ", worst " << tally.worst << " voxels";
     EXPECT_EQ(tally.words, 0u) << name << ": of " << tally.texels;
+    EXPECT_EQ(tally.masks, 0u) << name << ": voxels whose mask is not what their texels say";
     EXPECT_LE(double(tally.signs), 1e-4 * double(tally.texels)) << name;
 }
 

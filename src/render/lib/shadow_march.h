@@ -14,9 +14,9 @@ struct SoftShadow {
     Distance distance;
     float band = 1e30f;  // metres: what a baked field would know
 
-    vec2 shadow_field(vec3 p) {
+    vec3 shadow_field(vec3 p, vec3) {
         const float d = distance(p);
-        return {d > band ? 1e30f : max(d, -band), min(std::fabs(d), band)};
+        return {d > band ? 1e30f : max(d, -band), min(std::fabs(d), band), 0};
     }
 #include "render/lib/soft_shadow.gpu.h"
 };

@@ -14,10 +14,12 @@
 // Steps: sphere tracing (Hart, 1996), as far as the cone surely stays clear (cf. Crassin et al., 2011, for cones).
 //
 // A text that includes this first declares
-//     vec2 shadow_field(vec3 p)
+//     vec3 shadow_field(vec3 p, vec3 direction)
 // x: distance to the surface, as true as known, negative inside; where only "farther than this" is known, any large value outside,
 // and inside the least depth.
-// y: how far a step may go from there, > 0, never past the surface. Any unit of length, the same in all arguments.
+// y: how far a step may go from there, > 0, never past the surface, whatever its direction.
+// z: how far the ray from there along `direction` surely meets nothing and the field would say no more than "far"; 0 where it may say
+// more. Any unit of length, the same in all arguments.
 // C++ includes it through shadow_march.h. The text has no guard: there each field is a class of its own.
 
 #ifndef __cplusplus
@@ -90,7 +92,7 @@ KILN_FN ShadowSight shadow_look(vec3 p, vec3 l, float tan_radius, vec2 on_disc, 
             vec3 q = p + direction * nearest_t;
             at = probe < 2 ? q + basis.tangent * side : q + basis.bitangent * side;
         }
-        vec2 f = shadow_field(at);
+        vec3 f = shadow_field(at, direction);
         if (probe >= 0) {
             // A distance cannot have grown by more than the way; larger values say no more than "far".
             float d = min(f.x, nearest + max(0.25f * nearest, march.smallest_step));
@@ -123,7 +125,9 @@ KILN_FN ShadowSight shadow_look(vec3 p, vec3 l, float tan_radius, vec2 on_disc, 
             // While the cone is clear, as far as it stays so; else in steps that find the closest approach to within 3 %.
             float clear = (f.y - cone) / (1.0f + tan_radius);
             float close = tan_radius > 0.0f ? max(0.4f * f.y, min(f.y, 0.05f * cone)) : f.y;
-            t = t + max(max(clear, close), march.smallest_step);
+            float step = max(max(clear, close), march.smallest_step);
+            open = open && f.z <= step;
+            t = t + max(step, f.z);
         }
     }
     float size = sqrt(across * across + along * along);

@@ -60,7 +60,7 @@ void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, con
     const Groups groups{uint32_t(slots.size()), 1, 1};
     if (!by_copy) {
         g.dispatch(bake_kernel(format, by_copy, use), groups,
-                   {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.palettes),
+                   {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.tables),
                     g.read_write(f.dropped), g.write(f.materials), g.write(f.distances)},
                    push);
         return;
@@ -70,7 +70,7 @@ void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, con
     const uint64_t groups_of_bricks = (slots.size() + side_by_side - 1) / side_by_side;
     Buffer codes = g.create_buffer("bake codes", groups_of_bricks * kBakeCopyRows * kBakeCopyBytes);
     g.dispatch(bake_kernel(format, by_copy, use), groups,
-               {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.palettes),
+               {g.read(jobs), g.read(f.records), g.read(f.code), g.read(f.numbers), g.write(f.tables),
                 g.read_write(f.dropped), g.write(f.materials), g.write(codes)},
                push);
     g.copy(codes, f.distances,

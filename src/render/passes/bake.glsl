@@ -10,7 +10,7 @@ layout(set = 0, binding = 0, std430) readonly buffer Jobs { uint job_slots[]; };
 layout(set = 0, binding = 1, std430) readonly buffer Records { BrickRecord records[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Code { uvec2 code[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Numbers { float numbers[]; };
-layout(set = 0, binding = 4, std430) writeonly buffer Palettes { uint palettes[]; };
+layout(set = 0, binding = 4, std430) writeonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 5, std430) buffer Dropped { uint dropped_materials; };
 layout(set = 0, binding = 6, r32ui) writeonly uniform uimage3D materials;  // two texels a word, along x
 layout(push_constant) uniform Push { BakePush push; };
@@ -25,6 +25,7 @@ float sdf_sample(uint at) { return numbers[at]; }
 void store_row(uvec3 atlas_texel, uint job, uint row, float d_voxels[8]);
 
 const uint kNone = 0xffffffffu;
+shared uint solid_rows[kBakeThreads];
 shared uint found_id;
 shared uint found_weight;
 shared uint palette[kPaletteSize];
@@ -38,13 +39,15 @@ void main() {
     ivec3 texel = ivec3(record.texel_x, record.texel_y + int(row & 7u), record.texel_z + int(row >> 3u));
 
     float d_voxels[8];
+    uint solid = 0u;
     uint ids[8];      // the two material numbers, 16 bits each; kNoMaterial: none (outside the band both)
     uint weights[8];  // of the second, 0 … 255 of 510
     for (int x = 0; x < 8; ++x) {
         Mix mixed;
         vec3 p_world = vec3(texel + ivec3(x, 0, 0)) * push.voxel_size;
-        float d = tape_materials(record.code_first, record.code_count, p_world, mixed);
+        float d = tape_materials(record.code_first, record.code_count, p_world, true, mixed);
         d_voxels[x] = d * push.voxels_per_metre;
+        if (d_voxels[x] <= 0.0) solid |= 1u << x;
         bool in_band = abs(d_voxels[x]) < kBandVoxels;
         uint id0 = mixed.id0 == float(kNoMaterial) ? 0u : uint(mixed.id0);
         uint id1 = mixed.share > 0.0 ? uint(mixed.id1) : kNoMaterial;
@@ -55,6 +58,17 @@ void main() {
     uint bricks_y = push.atlas_bricks_x_y >> 16u;
     uvec3 corner = uvec3(slot % bricks_x, (slot / bricks_x) % bricks_y, slot / (bricks_x * bricks_y)) * 8u + uvec3(0u, row & 7u, row >> 3u);
     store_row(corner, job, row, d_voxels);
+    solid_rows[row] = solid;
+    barrier();
+    if (row < uint(kSolidMaskWords)) {
+        uint first = (row >> 1u) * 8u + (row & 1u) * 4u;
+        uint word = 0u;
+        for (uint y = 0u; y < 4u - (row & 1u); ++y) {
+            uint at = first + y;
+            word |= solid_voxels(solid_rows[at], solid_rows[at + 1u], solid_rows[at + 8u], solid_rows[at + 9u]) << (7u * y);
+        }
+        tables[slot * uint(kBrickTableWords) + uint(kPaletteSize) + row] = word;
+    }
 
     // The palette: distinct numbers in ascending order; beyond 16 the lightest goes (of equals the higher number).
     uint count = 0u;
@@ -110,7 +124,7 @@ void main() {
         any_last = true;
         barrier();
     }
-    if (row < uint(kPaletteSize)) palettes[slot * uint(kPaletteSize) + row] = row < count ? palette[row] : kNoMaterial;
+    if (row < uint(kPaletteSize)) tables[slot * uint(kBrickTableWords) + row] = row < count ? palette[row] : kNoMaterial;
     if (row == 0u && dropped != 0u) atomicAdd(dropped_materials, dropped);
 
     uint heaviest = 0u;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // The baked field in kernels: what field/march.gpu.h and field/surface.gpu.h ask for. The including kernel declares first:
-//   FrameParams frame, uint cells[] (the brick map), texture3D distances (the atlas);
+//   FrameParams frame, uint cells[] (the brick map), texture3D distances (the atlas), uint tables[] (palettes and solid masks);
 //   for KILN_FIELD_SURFACE also utexture3D materials (two texels a word, along x).
 
 #include "field/codes.gpu.h"
@@ -30,6 +30,11 @@ Corners field_corners(int slot, ivec3 voxel) {
     c.v011 = texelFetch(distances, at + ivec3(0, 1, 1), 0).r * scale;
     c.v111 = texelFetch(distances, at + ivec3(1, 1, 1), 0).r * scale;
     return c;
+}
+
+bool field_voxel_solid(int slot, ivec3 voxel) {
+    uint word = tables[slot * kBrickTableWords + solid_mask_word(voxel.y, voxel.z)];
+    return (frame.flags & kFrameAccelerate) == 0u || ((word >> solid_mask_bit(voxel.x, voxel.y)) & 1u) != 0u;
 }
 
 #include "field/march.gpu.h"

@@ -12,7 +12,8 @@ layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 3) uniform texture3D distances;
 layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D visibility;
-layout(set = 0, binding = 5, std430) writeonly buffer Counters { uint evaluations[]; };  // one a workgroup
+layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 6, std430) writeonly buffer Counters { uint evaluations[]; };  // one a workgroup
 
 #include "render/passes/field.glsl"
 #include "render/passes/rays.glsl"

@@ -21,7 +21,7 @@ Visibility march(Graph& g, const TileInputs& in) {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
         g.dispatch(kMarch, in.size,
                    {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words),
-                    g.write(counted)});
+                    g.read(f.tables), g.write(counted)});
         out.evaluations.push_back(counted);
     }
     if (in.exact) {

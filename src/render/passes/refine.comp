@@ -38,15 +38,22 @@ void main() {
         float t_before = t;
         float d_before = 0.0;
         vec3 size = abs(origin + ray.direction * (t * h));
-        float step = refine_gradient_step(h, max(max(size.x, size.y), size.z));
+        float coordinate = max(max(size.x, size.y), size.z);
+        float step = refine_gradient_step(h, coordinate);
+        float enough = refine_enough(h, coordinate);
         vec3 gradient = vec3(0.0);
         Mix mixed = make_mix(0.0, 0.0, 0.0);
+        // One call serves the looks for the place, the one at it, and the six around it: every inlined copy costs compile time.
         for (int i = -kRefineSteps; i < 7; ++i) {
             vec3 away = vec3(0.0);
             if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
             Mix here;
-            float d = tape_materials(record.code_first, record.code_count, origin + ray.direction * (t * h) + away, here) / h;
+            float d = tape_materials(record.code_first, record.code_count, origin + ray.direction * (t * h) + away, i == 0, here) / h;
             if (i < 0) {
+                if (abs(d) <= enough) {
+                    i = -1;
+                    continue;
+                }
                 float next = refine_next(i + kRefineSteps, t_before, d_before, t, d);
                 t_before = t;
                 d_before = d;

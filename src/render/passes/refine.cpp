@@ -33,7 +33,7 @@ struct Batch {
     std::array<float, kMostAtOnce> x, y, z, d;
     std::array<sdf::MaterialMix, kMostAtOnce> mixes;
     std::array<vec3, kMostAtOnce> direction, gradient;
-    std::array<float, kMostAtOnce> t_first, t, t_before, d_before;
+    std::array<float, kMostAtOnce> t_first, t, t_before, d_before, size;
     std::array<bool, kMostAtOnce> holds;
 };
 
@@ -70,6 +70,8 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
             b.direction[k] = shade::camera_direction_at(frame.camera, float(x) + 0.5f, float(y) + 0.5f);
             b.t_first[k] = b.t[k] = b.t_before[k] = std::bit_cast<float>(visibility[4 * size_t{here[k]}]);
             b.d_before[k] = 0;
+            const vec3 at = origin + b.direction[k] * (b.t[k] * h);
+            b.size[k] = gpu::largest3({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
             b.gradient[k] = {};
         }
         for (int look = -kRefineSteps; look < 7; ++look) {
@@ -78,10 +80,7 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
             for (size_t k = 0; k < here.size(); ++k) {
                 vec3 p = origin + b.direction[k] * (b.t[k] * h);
                 if (look > 0) {
-                    const vec3 at = origin + b.direction[k] * (b.t_first[k] * h);
-                    const float step =
-                        side *
-                        refine_gradient_step(h, gpu::largest3({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)}));
+                    const float step = side * refine_gradient_step(h, b.size[k]);
                     (axis == 0 ? p.x : axis == 1 ? p.y : p.z) += step;
                 }
                 b.x[k] = p.x, b.y[k] = p.y, b.z[k] = p.z;
@@ -91,9 +90,12 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
             } else {
                 sdf::evaluate(tape, points, b.d.data());
             }
+            bool searching = false;
             for (size_t k = 0; k < here.size(); ++k) {
                 const float d = b.d[k] / h;
                 if (look < 0) {
+                    if (std::fabs(d) <= refine_enough(h, b.size[k])) continue;
+                    searching = true;
                     const float next = refine_next(look + kRefineSteps, b.t_before[k], b.d_before[k], b.t[k], d);
                     b.t_before[k] = b.t[k];
                     b.d_before[k] = d;
@@ -104,6 +106,7 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
                     (axis == 0 ? b.gradient[k].x : axis == 1 ? b.gradient[k].y : b.gradient[k].z) += side * d;
                 }
             }
+            if (look < 0 && !searching) look = -1;
         }
         for (size_t k = 0; k < here.size(); ++k) {
             const float steep = length(b.gradient[k]);

@@ -11,8 +11,8 @@ namespace kiln::render {
 using namespace kiln::gpu;
 #endif
 
-// Looks before the last one, which is at the place found.
-KILN_CONST int kRefineSteps = 6;
+// Looks at most, before the one at the place found.
+KILN_CONST int kRefineSteps = 16;
 // What may be left of the distance there; and how far a place may move before it is another surface's.
 KILN_CONST float kRefinedVoxels = 0.01f;
 KILN_CONST float kRefineReachVoxels = 6.0f;
@@ -29,6 +29,9 @@ KILN_FN float refine_next(int step, float t_before, float d_before, float t, flo
 KILN_FN bool refine_holds(float t_first, float t, float d) {
     return abs(d) <= kRefinedVoxels && abs(t - t_first) <= kRefineReachVoxels;
 }
+
+// A distance, voxels, that is as good as none for a coordinate of that size, metres: no more looks.
+KILN_FN float refine_enough(float voxel_size, float coordinate) { return max(2e-4f, 5e-7f * coordinate / voxel_size); }
 
 // Metres between the point and each sample of a central difference: a tenth of a voxel, but never so little that the rounding of a
 // coordinate of that size shows.

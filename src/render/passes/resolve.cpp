@@ -16,7 +16,7 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const I
     out.seen = g.create("visibility resolved", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     const FieldHandles& f = in.field;
     std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),      g.read(f.records),   g.read(in.rays),
-                          g.read(f.palettes),  g.read(in.materials), g.read(f.distances), g.read(f.materials),
+                          g.read(f.tables),    g.read(in.materials), g.read(f.distances), g.read(f.materials),
                           g.read(visibility),  g.read(refined),      g.write(out.words),  g.write(out.depth),
                           g.write(out.seen)};
     if (in.exact) {

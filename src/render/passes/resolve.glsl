@@ -7,7 +7,7 @@ layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Records { BrickRecord records[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Rays { FrameRay rays[]; };
-layout(set = 0, binding = 4, std430) readonly buffer Palettes { uint palettes[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialRecord material_table[]; };
 layout(set = 0, binding = 6) uniform texture3D distances;
 layout(set = 0, binding = 7) uniform utexture3D materials;
@@ -81,8 +81,8 @@ void main() {
         vec3 p = voxel_point(local, voxel, t - local.t_base);
         s.normal = unit_or(dual_gradient(slot, texel / kBrickVoxels, vec3(voxel) + p), -ray.direction);
         SurfaceMaterial mixed = surface_material(slot, voxel, p);
-        add_material(s, palettes[slot * kPaletteSize + int(mixed.slot0)], 1.0 - mixed.share);
-        if (mixed.share > 0.0) add_material(s, palettes[slot * kPaletteSize + int(mixed.slot1)], mixed.share);
+        add_material(s, tables[slot * kBrickTableWords + int(mixed.slot0)], 1.0 - mixed.share);
+        if (mixed.share > 0.0) add_material(s, tables[slot * kBrickTableWords + int(mixed.slot1)], mixed.share);
 #ifdef KILN_EXACT
     } else if (state != kSeenInside) {
         uvec2 here_code = code_of(state, slot);
@@ -97,7 +97,7 @@ void main() {
             vec3 away = vec3(0.0);
             if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
             Mix here;
-            float d = tape_materials(here_code.x, here_code.y, p_world + away, here);
+            float d = tape_materials(here_code.x, here_code.y, p_world + away, i == 0, here);
             if (i == 0) {
                 mixed = here;
             } else {

@@ -37,6 +37,7 @@ layout(constant_id = 5) const bool kAlongCode = true;
 const int kShadowSteps = 384;
 const float kSaturatedVoxels = 3.95;  // stored distances from here on only say "far"
 const float kFarAway = 1e4;
+const float kPastFace = 1e-3;  // voxels: a step that ends on a cell's face would be rounded to either side
 const float kClearOfEmptyCell = 0.13;  // texels of an empty cell are a voxel or more from the surface, its points 1 - sqrt(3)/2
 
 // Trilinear distance, voxels, at a point of a brick counted from its texel (0, 0, 0).
@@ -51,6 +52,18 @@ float sampled_distance(int slot, vec3 local) {
 // Positions of shadow rays count from here: the voxel their point is in.
 ivec3 shadow_whole;
 
+// The last cell looked at, and its word: near a surface many steps stay in one.
+ivec3 shadow_cell = ivec3(-1);
+uint shadow_word = 0u;
+
+uint shadow_cell_word(ivec3 cell) {
+    if (cell != shadow_cell) {
+        shadow_cell = cell;
+        shadow_word = field_cell(cell);
+    }
+    return shadow_word;
+}
+
 // Distance of a point from the grid's box, 0 inside; `local` counts from the grid's first texel.
 float grid_gap(vec3 local) {
     vec3 size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
@@ -58,12 +71,12 @@ float grid_gap(vec3 local) {
 }
 
 // For soft_shadow.gpu.h, in voxels.
-vec2 shadow_field(vec3 p) {
+vec3 shadow_field(vec3 p, vec3 direction) {
     ivec3 whole = shadow_whole - grid_first_cell() * kBrickVoxels;
     vec3 local = vec3(whole) + p;
     ivec3 cell = ivec3(floor(local / float(kBrickVoxels)));
     bool inside_grid = in_grid(cell);
-    uint word = inside_grid ? field_cell(cell) : 0u;
+    uint word = inside_grid ? shadow_cell_word(cell) : 0u;
     bool occupied = (word & kCellOccupied) != 0u;
     int slot = int(word & kCellSlotMask);
 #ifdef KILN_EXACT
@@ -77,21 +90,26 @@ vec2 shadow_field(vec3 p) {
         float d = tape_distance(here_code.x, here_code.y, (vec3(shadow_whole) + p) * frame.grid.voxel_size) / frame.grid.voxel_size;
         // Outside the grid the code says nothing of what is inside.
         float step = state == kSeenOutside ? min(abs(d), grid_gap(local) + 0.25) : abs(d);
-        return vec2(d, max(step, 1e-3));
+        return vec3(d, max(step, 1e-3), 0.0);
     }
     }
 #endif
-    if (!inside_grid) return vec2(kFarAway, grid_gap(local) + 0.25);
+    if (!inside_grid) return vec3(kFarAway, grid_gap(local) + 0.25, 0.0);
     vec3 in_cell = local - vec3(cell * kBrickVoxels);
     if (occupied) {
         float d = sampled_distance(slot, in_cell);
-        return vec2(d >= kSaturatedVoxels ? kFarAway : d, max(abs(d) - kTrilinearErrorVoxels, 0.01));
+        return vec3(d >= kSaturatedVoxels ? kFarAway : d, max(abs(d) - kTrilinearErrorVoxels, 0.01), 0.0);
     }
     // To the nearest face of the cube of cells that are empty.
     vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
-    float rim = min(min(to_face.x, to_face.y), to_face.z) + float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
+    float around = float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
+    float rim = min(min(to_face.x, to_face.y), to_face.z) + around;
     float least = max(rim, 0.0) + kClearOfEmptyCell;
-    return (word & kCellInside) != 0u ? vec2(-least, least) : vec2(kFarAway, least);
+    if ((word & kCellInside) != 0u) return vec3(-least, least, 0.0);
+    // The ray itself: to where it leaves that cube.
+    vec3 ahead = mix(in_cell, float(kBrickVoxels) - in_cell, greaterThan(direction, vec3(0.0))) + around;
+    vec3 leaves = ahead / max(abs(direction), vec3(1e-6));
+    return vec3(kFarAway, least, min(min(leaves.x, leaves.y), leaves.z) + kPastFace);
 }
 
 #include "render/lib/soft_shadow.gpu.h"

@@ -40,6 +40,10 @@ TapeUse tape_use(std::span<const sdf::Instruction> code) {
     return use;
 }
 
+TapeUse any_kind(const TapeUse& use) {
+    return {.registers = std::min((use.registers + 3) / 4 * 4, uint32_t(sdf::kRegisters))};
+}
+
 TapeUse both(const TapeUse& a, const TapeUse& b) {
     return {a.shapes | b.shapes, a.warps | b.warps, a.opcodes | b.opcodes, std::max(a.registers, b.registers)};
 }
