@@ -97,7 +97,10 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         .raw("passes", "{" + passes + "}");
     json.number("evaluations", double(stats.evaluations)).number("atlas_bytes", double(stats.atlas_bytes));
     json.number("host_bytes", double(stats.host_bytes)).number("pipelines_created", double(stats.pipelines_created));
-    json.number("coarsened", frame.coarsened).number("load_s", load).number("total_s", total);
+    json.number("exposure", double(stats.exposure))
+        .number("coarsened", frame.coarsened)
+        .number("load_s", load)
+        .number("total_s", total);
     return json.line();
 }
 

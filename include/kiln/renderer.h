@@ -24,7 +24,9 @@ namespace render::shade {
 struct EnvironmentMap;
 }
 
-enum class ToneMap : uint8_t { None, Exponential, Aces, Neutral };
+enum class ToneMap : uint8_t { None, Exponential, Aces, Neutral, Agx };
+/// How light spreads round what is bright: over many sizes, or as a blur of a few pixels around what exceeds a threshold.
+enum class BloomKind : uint8_t { Pyramid, Gaussian };
 
 struct Camera {
     vec3 position{3, 2, 4};
@@ -33,6 +35,11 @@ struct Camera {
     float fov_y_deg = 45;   ///< (0, 180)
     float exposure = 1.0f;  ///< linear multiplier before the tone map, > 0
     ToneMap tone_map = ToneMap::Aces;
+    bool auto_exposure = false;  ///< the picture's middle luminance becomes middle grey, times `exposure`
+    float bloom = 0;             ///< share of the light that the lens scatters, [0, 1]; Gaussian: what is added
+    float bloom_size = 0.1f;     ///< Pyramid: the widest glow, as a share of the picture's height, (0, 1]
+    float bloom_threshold = 1;   ///< Gaussian: exposed luminance above which light glows, >= 0
+    BloomKind bloom_kind = BloomKind::Pyramid;
 };
 
 /// One light. Illuminance in lux, intensity in candela; colour scales both.
@@ -77,12 +84,14 @@ struct RenderSettings {
     bool accelerate = true;  ///< false: visit every cell and voxel (the slow twin of the jumps)
     bool refine = true;  ///< what bricks show is moved to where the exact program has it, with its normal and materials
     bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
+    float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
 };
 
 /// Pixels, top row first.
 struct Picture {
     int width = 0, height = 0;
-    std::vector<float> rgba;    ///< scene-linear before the tone map (or the view's values); 4 floats a pixel
+    std::vector<float>
+        rgba;  ///< scene-linear, before bloom, exposure and tone map (or the view's values); 4 floats a pixel
     std::vector<uint8_t> srgb;  ///< what a screen shows: tone-mapped sRGB, 4 bytes a pixel
     std::vector<float> depth;   ///< metres along the ray, +infinity where nothing is hit
     /// Writes .png (srgb) or .exr (rgba as half; the depth view as 32-bit float). The file appears whole or not at all.
@@ -101,6 +110,7 @@ struct RenderStats {
     uint64_t atlas_bytes = 0, host_bytes = 0;
     uint64_t pipelines_created = 0;  ///< since creation; constant once warm
     int coarsened = 0;               ///< times the voxel size was doubled to fit the pool
+    float exposure = 1;              ///< what radiance was multiplied with, chosen or measured
 };
 
 struct DeviceInfo {

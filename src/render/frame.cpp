@@ -33,6 +33,19 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     if (!(camera.exposure > 0) || !std::isfinite(camera.exposure)) {
         return Error{formatted("a camera with exposure {}; it is above 0", camera.exposure), ErrorKind::Usage};
     }
+    if (!(camera.bloom >= 0 && camera.bloom <= 1))
+        return Error{formatted("a camera with bloom {}; it is a share, 0 to 1", camera.bloom), ErrorKind::Usage};
+    if (!(camera.bloom_size > 0 && camera.bloom_size <= 1)) {
+        return Error{formatted("a camera with bloom_size {}; it is a share of the height, above 0 and at most 1",
+                               camera.bloom_size),
+                     ErrorKind::Usage};
+    }
+    if (!(camera.bloom_threshold >= 0)) {
+        return Error{formatted("a camera with bloom_threshold {}; it is at least 0", camera.bloom_threshold),
+                     ErrorKind::Usage};
+    }
+    if (!(settings.elapsed >= 0))
+        return Error{formatted("elapsed {} s; it is at least 0", settings.elapsed), ErrorKind::Usage};
     const vec3 look = camera.target - camera.position;
     if (!(dot(look, look) > 0))
         return Error{"the camera's target is its position; it must be elsewhere", ErrorKind::Usage};
@@ -67,8 +80,6 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.program_count = field.program_count();
     p.params_first = field.params_first();
     p.light_count = uint32_t(frame.lights.size());
-    p.exposure = camera.exposure;
-    p.tone_map = uint32_t(camera.tone_map);
     p.view = uint32_t(settings.view);
     p.material_count = uint32_t(std::max<size_t>(frame.materials.size(), 1));
     return p;
@@ -106,9 +117,14 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
     const Surface surface = resolve(g, in, words, refined);
     if (wanted == View::Shaded) {
         const Image radiance = light(g, in, surface.seen, surface);
-        const Image shown = tonemap(g, in, radiance);
         out.radiance = g.readback(radiance);
-        out.shown = g.readback(shown);
+        if (in.develops) {
+            Buffer exposure = in.exposure;
+            if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
+            const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
+            out.shown = g.readback(tonemap(g, radiance, glow, exposure, in.camera));
+            out.exposure = g.readback(exposure);
+        }
     } else {
         const Shown shown = view(g, in, words, surface);
         out.radiance = g.readback(shown.values);
@@ -152,6 +168,11 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     }
     out.push_back(&shadow_kernel(in));
     out.push_back(&light_kernel(in));
+    if (!in.develops) return out;
+    if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
+    if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Pyramid)
+        out.insert(out.end(), {&kBloomDown, &kBloomUp});
+    if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
     return out;
 }

@@ -15,8 +15,9 @@ std::vector<MaterialRecord> material_records(const Frame& frame);
 
 struct TileResult {
     Readback radiance;  // 4 halves a pixel; of a view: 4 floats
-    Readback shown;     // 4 bytes a pixel
+    Readback shown;     // 4 bytes a pixel; of a shaded tile only where TileInputs::develops
     Readback depth;     // a float a pixel
+    Readback exposure;  // ExposureState, with `shown`, of a shaded tile
     std::vector<Readback> evaluations;
 };
 TileResult record_tile(Graph& g, const TileInputs& in, View view);

@@ -25,13 +25,13 @@ void place_tile(Picture& picture, int x, int y, int width, int height, std::span
                 std::span<const std::byte> shown, std::span<const float> depth) {
     const size_t row = size_t(width);
     const bool halves = picture.view == View::Shaded;
-    KILN_ASSERT(depth.size() == row * size_t(height) && shown.size() == depth.size() * 4);
+    KILN_ASSERT(depth.size() == row * size_t(height) && (shown.empty() || shown.size() == depth.size() * 4));
     KILN_ASSERT(radiance.size() == depth.size() * (halves ? 8 : 16));
     for (size_t j = 0; j < size_t(height); ++j) {
         const size_t to = (size_t(y) + j) * size_t(picture.width) + size_t(x);
         const size_t from = j * row;
         std::memcpy(picture.depth.data() + to, depth.data() + from, row * 4);
-        std::memcpy(picture.srgb.data() + to * 4, shown.data() + from * 4, row * 4);
+        if (!shown.empty()) std::memcpy(picture.srgb.data() + to * 4, shown.data() + from * 4, row * 4);
         if (!halves) {
             std::memcpy(picture.rgba.data() + to * 4, radiance.data() + from * 16, row * 16);
             continue;

@@ -6,6 +6,7 @@
 #include "base/log.h"
 #include "field/field.h"
 #include "render/frame.h"
+#include "render/lens.h"
 #include "render/graph_runner.h"
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
@@ -21,9 +22,10 @@ namespace kiln {
 namespace render {
 namespace {
 
-// Tiles bound the memory of a frame's images (about 100 bytes a pixel), whatever the size of the picture.
-constexpr int kTileWidth = 2048;
+// Tiles bound the memory of a frame's images (about 100 bytes a pixel), whatever the size of the picture. A GPU takes 3840 x 2160 whole.
+constexpr int kTileWidth = 4096;
 constexpr int kTilePixels = 1 << 21;
+constexpr int kTilePixelsOfGpu = 9 << 20;
 
 }  // namespace
 }  // namespace render
@@ -37,12 +39,14 @@ struct Renderer::Impl {
     std::string fault;  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
+    rhi::BufferHandle exposure;
+    shade::ExposureState eye{};                                    // what is in it, and stays from picture to picture
     std::shared_ptr<const shade::EnvironmentMap> environment_map;  // what is in the buffer
     RenderStats stats;
 
     ~Impl() {
         field.reset();
-        for (const rhi::BufferHandle buffer : {ggx_table, environment}) {
+        for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
             if (!runner || !buffer) continue;
             runner->forget(buffer);
             device->destroy(buffer);
@@ -58,6 +62,18 @@ struct Renderer::Impl {
                              Picture& picture);
     // Software devices run the tape many times slower than our SIMD.
     bool refines_on_host() const { return device->info().kind == rhi::DeviceKind::Cpu; }
+    struct TileSize {
+        int width, height;
+    };
+    TileSize tile_size(const RenderSettings& settings) const {
+        const int most = refines_on_host() ? kTilePixels : kTilePixelsOfGpu;
+        const int width = std::min(settings.width, kTileWidth);
+        return {width, std::min(settings.height, most / width)};
+    }
+    int tiles_of(const RenderSettings& settings) const {
+        const auto [width, height] = tile_size(settings);
+        return ((settings.width + width - 1) / width) * ((settings.height + height - 1) / height);
+    }
     // The switches of a frame; its resources are still to come.
     TileInputs inputs(const Frame& frame, const RenderSettings& settings) const {
         TileInputs in;
@@ -66,6 +82,9 @@ struct Renderer::Impl {
         in.exact = settings.analytic || field->leaves_grid();
         in.horizons = !settings.analytic && field->outside_is_concave();
         in.refine = settings.refine && !settings.analytic && !refines_on_host();
+        in.camera = frame.camera;
+        in.elapsed = settings.elapsed;
+        in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
         return in;
@@ -91,6 +110,9 @@ Result<void> Renderer::Impl::prepare() {
     ggx_table = *buffer;
     if (auto written = device->write_buffer(ggx_table, 0, std::as_bytes(table)); !written) return written;
     stats.device = device->info().name;
+    auto state = device->create_buffer({.size = sizeof(shade::ExposureState), .label = "exposure"});
+    if (!state) return state.error();
+    exposure = *state;
     return healthy();
 }
 
@@ -145,6 +167,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         in.environment = in.image_sky ? g.import("environment", environment)
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+        in.exposure = g.import("exposure", exposure);
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -183,11 +206,20 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     if (auto done = run(g, tile.evaluations); !done) return done;
     auto radiance = tile.radiance.get();
     if (!radiance) return radiance.error();
-    auto shown = tile.shown.get();
-    if (!shown) return shown.error();
+    std::vector<std::byte> shown;
+    if (settings.view != View::Shaded || in.develops) {
+        auto bytes = tile.shown.get();
+        if (!bytes) return bytes.error();
+        shown = std::move(*bytes);
+    }
+    if (settings.view == View::Shaded && in.develops) {
+        auto state = tile.exposure.get_as<shade::ExposureState>();
+        if (!state) return state.error();
+        eye = state->front();
+    }
     auto depth = tile.depth.get_as<float>();
     if (!depth) return depth.error();
-    place_tile(picture, params.tile_x, params.tile_y, params.tile_width, params.tile_height, *radiance, *shown, *depth);
+    place_tile(picture, params.tile_x, params.tile_y, params.tile_width, params.tile_height, *radiance, shown, *depth);
     return {};
 }
 
@@ -227,8 +259,10 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     picture.rgba.resize(pixels * 4);
     picture.srgb.resize(pixels * 4);
     picture.depth.resize(pixels);
-    const int tile_width = std::min(settings.width, kTileWidth);
-    const int tile_height = std::min(settings.height, kTilePixels / tile_width);
+    const auto [tile_width, tile_height] = tile_size(settings);
+    if (!frame.camera.auto_exposure) eye = measured_exposure({}, frame.camera, 0, {});
+    if (auto written = device->write_buffer(exposure, 0, std::as_bytes(std::span(&eye, 1))); !written)
+        return written.error();
     for (int y = 0; y < settings.height; y += tile_height) {
         for (int x = 0; x < settings.width; x += tile_width) {
             FrameParams tile = *params;
@@ -239,6 +273,14 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
             if (auto done = render_tile(frame, settings, tile, picture); !done) return done.error();
         }
     }
+    if (settings.view == View::Shaded && !inputs(frame, settings).develops) {
+        const auto start = std::chrono::steady_clock::now();
+        eye = measured_exposure(picture.rgba, frame.camera, settings.elapsed, eye);
+        develop(picture, frame.camera, eye);
+        const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+        add_times({.passes = {{.name = "develop", .ms = ms}}, .total_ms = ms});
+    }
+    stats.exposure = eye.multiplier;
     stats.bricks = int(frame.field->stats().bricks);
     stats.edits = int(frame.field->program().index.size());
     stats.atlas_bytes = field->atlas_bytes();

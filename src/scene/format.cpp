@@ -41,7 +41,8 @@ constexpr KeyRow inside(std::string_view name, KeyType type, const Table& table,
 
 constexpr std::string_view kOps[] = {"union", "subtract", "intersect", "paint"};
 constexpr std::string_view kLights[] = {"directional", "point", "spot"};
-constexpr std::string_view kToneMaps[] = {"none", "exponential", "aces", "neutral"};
+constexpr std::string_view kToneMaps[] = {"none", "exponential", "aces", "neutral", "agx"};
+constexpr std::string_view kBloomKinds[] = {"pyramid", "gaussian"};
 constexpr std::string_view kAxes[] = {"x", "y", "z"};
 constexpr std::string_view kMotions[] = {"static", "kinematic", "dynamic"};
 constexpr std::string_view kCollisions[] = {"convex", "triangles"};
@@ -144,6 +145,12 @@ constexpr KeyRow kCameraRows[] = {
     number("fov_y_deg", KILN_AT(Camera, fov_y_deg), 45, "deg", "[1, 170]", "vertical field of view"),
     number("exposure", KILN_AT(Camera, exposure), 1, "1", "> 0", "linear multiplier before the tone map"),
     choice("tone_map", kToneMaps, "from light to the screen; left out: aces"),
+    plain("auto_exposure", KeyType::Bool, "the picture's middle luminance becomes middle grey; exposure corrects it"),
+    number("bloom", KILN_AT(Camera, bloom), 0, "1", "[0, 1]", "share of the light that the lens scatters"),
+    number("bloom_size", KILN_AT(Camera, bloom_size), 0.1f, "1", "(0, 1]", "the widest glow, of the picture's height"),
+    number("bloom_threshold", KILN_AT(Camera, bloom_threshold), 1, "1", ">= 0",
+           "gaussian: what is brighter, exposed, glows"),
+    choice("bloom_kind", kBloomKinds, "glow of many sizes, or a blur of what is bright; left out: pyramid"),
 };
 constexpr KeyRow kPhysicsRows[] = {
     numbers("gravity", 3, kKept, {0, -9.81f, 0}, "m/s²", "any", "acceleration"),
@@ -222,7 +229,7 @@ constexpr KeyRow kSceneRows[] = {
 }  // namespace
 
 const std::span<const std::string_view> kOpNames = kOps, kLightNames = kLights, kToneMapNames = kToneMaps,
-                                        kAxisNames = kAxes;
+                                        kBloomKindNames = kBloomKinds, kAxisNames = kAxes;
 
 const Table kSceneTable{"scene", "A Kiln scene, format 1", kSceneRows};
 const Table kFieldTable{"field", "Resolution and extent of the field", kFieldRows};

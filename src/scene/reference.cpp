@@ -4,9 +4,8 @@
 #include "scene/exact.h"
 
 #include "field/field.h"
-#include "render/lib/color.gpu.h"
+#include "render/lens.h"
 #include "render/lib/pack.h"
-#include "render/lib/tonemap.gpu.h"
 #include "render/reference.h"
 
 #include <kiln/renderer.h>
@@ -67,16 +66,8 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     out.height = traced.height;
     out.rgba = traced.rgba;
     out.depth = traced.depth;
-    out.srgb.resize(out.rgba.size());
-    for (size_t i = 0; i + 3 < out.rgba.size(); i += 4) {
-        const float e = frame.camera.exposure;
-        const auto shown = render::shade::tone_map(uint32_t(frame.camera.tone_map),
-                                                   {out.rgba[i] * e, out.rgba[i + 1] * e, out.rgba[i + 2] * e});
-        const float channels[3] = {shown.x, shown.y, shown.z};
-        for (size_t k = 0; k < 3; ++k)
-            out.srgb[i + k] = uint8_t(render::shade::byte_from_unit(render::shade::srgb_from_linear(channels[k])));
-        out.srgb[i + 3] = 255;
-    }
+    const render::shade::ExposureState exposure = render::measured_exposure(out.rgba, frame.camera, 0, {});
+    render::develop(out, frame.camera, exposure);
     if (stats) {
         *stats = {};
         stats->device = "CPU path tracer, exact edits";
@@ -85,6 +76,7 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
         stats->frame_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         stats->passes = {{"reference", stats->frame_ms}};
         stats->coarsened = frame.coarsened;
+        stats->exposure = exposure.multiplier;
     }
     return out;
 }

@@ -131,6 +131,13 @@ private:
                 if (!in_.choice(*t, kToneMapNames, &map)) return false;
                 camera.tone_map = ToneMap(map);
             }
+            if (const auto k = doc_.find(c, "bloom_kind")) {
+                int kind = 0;
+                if (!in_.choice(*k, kBloomKindNames, &kind)) return false;
+                camera.bloom_kind = BloomKind(kind);
+            }
+            if (const auto a = doc_.find(c, "auto_exposure"); a && !in_.boolean(*a, &camera.auto_exposure))
+                return false;
             const vec3 forward = camera.target - camera.position;
             if (!(length(forward) > 0)) return in_.fail(c, "position and target are the same point; move one of them");
             if (const auto u = doc_.find(c, "up"); u && !(length(camera.up) > 1e-6f))

@@ -152,6 +152,10 @@ private:
         for (const auto& [k, w] : members(was, kCameraTable)) {
             if (k == "tone_map") {
                 text(k, w, kToneMapNames[size_t(c.tone_map)], "aces");
+            } else if (k == "bloom_kind") {
+                text(k, w, kBloomKindNames[size_t(c.bloom_kind)], "pyramid");
+            } else if (k == "auto_exposure") {
+                flag(k, w, c.auto_exposure);
             } else {
                 number_row(*find_row(kCameraTable, k), w, &c.position.x);
             }

@@ -55,12 +55,12 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, camera) + i * 16);
     for (uint32_t i = 0; i < 12; ++i) expected.push_back(AT(FrameParams, width) + i * 4);
     for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, sky) + i * 16);
-    for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, exposure) + i * 4);
+    for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, view) + i * 4);
     EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
-    EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, exposure) + 12);
-    for (const Kernel* kernel : {&kMarch, &kMarchExact, &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact,
-                                 &kLight, &kTonemap, &kView}) {
+    EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, view) + 4);
+    for (const Kernel* kernel :
+         {&kMarch, &kMarchExact, &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kView}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, 0);
         ASSERT_TRUE(b) << kernel->name;

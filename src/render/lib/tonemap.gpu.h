@@ -17,6 +17,7 @@ KILN_CONST uint kToneMapNone = 0u;
 KILN_CONST uint kToneMapExponential = 1u;
 KILN_CONST uint kToneMapAces = 2u;
 KILN_CONST uint kToneMapNeutral = 3u;
+KILN_CONST uint kToneMapAgx = 4u;
 
 // Beyond this every curve is white; keeps squares finite in 32-bit floats.
 KILN_CONST float kBrightest = 65504.0f;
@@ -59,11 +60,33 @@ KILN_FN vec3 tone_neutral(vec3 c) {
     return vec3(saturate(v.x), saturate(v.y), saturate(v.z));
 }
 
+// AgX (Troy Sobotka, 2022): light is drawn together towards white, then 16.5 stops of it follow one curve, so bright saturated lights
+// pale instead of turning to another hue. Matrices for linear sRGB by Benjamin Wrensch (2023); the curve is the polynomial of degree
+// seven that Filament fits to the default contrast. What comes out is meant for a 2.2 power, which is taken off here.
+KILN_FN float agx_curve(float light) {
+    float x = (clamp(log2(max(light, 1e-10f)), -12.47393f, 4.026069f) + 12.47393f) / 16.5f;
+    float y = (((((((-17.86f * x + 78.01f) * x - 126.7f) * x + 92.06f) * x - 28.72f) * x + 4.361f) * x - 0.1718f) * x +
+               0.002857f);
+    return max(y, 0.0f);
+}
+
+KILN_FN vec3 tone_agx(vec3 c) {
+    vec3 v = vec3(0.842479062f * c.x + 0.0784336f * c.y + 0.0792237451f * c.z,
+                  0.0423282423f * c.x + 0.878468636f * c.y + 0.0791661275f * c.z,
+                  0.0423756549f * c.x + 0.0784336f * c.y + 0.879142974f * c.z);
+    v = vec3(agx_curve(v.x), agx_curve(v.y), agx_curve(v.z));
+    vec3 shown = vec3(1.19687901f * v.x - 0.0980208811f * v.y - 0.0990297441f * v.z,
+                      -0.0528968518f * v.x + 1.15190313f * v.y - 0.0989611768f * v.z,
+                      -0.0529716355f * v.x - 0.0980434501f * v.y + 1.15107367f * v.z);
+    return vec3(pow(saturate(shown.x), 2.2f), pow(saturate(shown.y), 2.2f), pow(saturate(shown.z), 2.2f));
+}
+
 KILN_FN vec3 tone_map(uint kind, vec3 exposed) {
     vec3 c = vec3(tone_input(exposed.x), tone_input(exposed.y), tone_input(exposed.z));
     if (kind == kToneMapExponential) return vec3(tone_exponential(c.x), tone_exponential(c.y), tone_exponential(c.z));
     if (kind == kToneMapAces) return tone_aces(c);
     if (kind == kToneMapNeutral) return tone_neutral(c);
+    if (kind == kToneMapAgx) return tone_agx(c);
     return vec3(min(c.x, 1.0f), min(c.y, 1.0f), min(c.z, 1.0f));
 }
 

@@ -34,10 +34,9 @@ struct FrameParams {
     uint program_count;                 // code of the whole program, from the program buffer's start
     uint params_first;                  // of Program::params in the numbers buffer
     SkyParams sky;
-    float exposure;
-    uint tone_map;  // kiln::ToneMap
-    uint view;      // kiln::View
+    uint view;  // kiln::View
     uint material_count;
+    uint pad_0, pad_1;
 };
 
 KILN_CONST uint kFrameAccelerate = 1u;       // jump over empty cells

@@ -9,6 +9,8 @@
 #include "render/passes/shadow.gpu.h"
 #include "render/passes/tape_use.h"
 
+#include <kiln/renderer.h>
+
 #include <vector>
 
 namespace kiln::render {
@@ -16,6 +18,7 @@ namespace kiln::render {
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchExact, kRefine, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons,
     kLight, kLightImage, kTonemap, kView;
+extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
 void bake_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, const BakePush& push, rhi::Format format,
@@ -46,7 +49,12 @@ struct TileInputs {
     bool horizons = false;  // exact code is half-spaces outside the grid, no more
     bool image_sky = false;
     bool refine = false;  // by the device: the host may do it
-    TapeUse use;          // of the code that is marched and resolved
+    // A shaded tile becomes what a screen shows here; else by develop() of lens.h, when the picture is whole.
+    bool develops = true;
+    Camera camera;
+    Buffer exposure;    // ExposureState: as it was, and as it is
+    float elapsed = 0;  // seconds since the picture before
+    TapeUse use;        // of the code that is marched and resolved
     TapeUse use_of_bricks;
 };
 
@@ -77,8 +85,13 @@ Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surf
 const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure.
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
-// Exposed, tone-mapped, sRGB-encoded.
-Image tonemap(Graph& g, const TileInputs& in, const Image& radiance);
+
+// The exposure that this picture asks for, from its histogram.
+void expose(Graph& g, const Image& radiance, Buffer& exposure, float seconds, float correction);
+// What the lens scatters: half the size (pyramid), or the same (Gaussian).
+Image bloom(Graph& g, const Image& radiance, const Buffer& exposure, const Camera& camera);
+// With its glow, exposed, tone-mapped, sRGB-encoded. `glow`: any image without bloom.
+Image tonemap(Graph& g, const Image& radiance, const Image& glow, const Buffer& exposure, const Camera& camera);
 
 // A debug view: its numbers, and its bytes as they are shown.
 struct Shown {

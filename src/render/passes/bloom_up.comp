@@ -1,0 +1,25 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// A level of the bloom pyramid and the coarser ones below it, mixed.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/bloom.gpu.h"
+
+layout(local_size_x = kBloomGroup, local_size_y = kBloomGroup) in;
+
+layout(set = 0, binding = 0) uniform texture2D coarser;
+layout(set = 0, binding = 1) uniform sampler linear;
+layout(set = 0, binding = 2) uniform texture2D level;
+layout(set = 0, binding = 3, rgba16f) writeonly uniform image2D target;
+layout(push_constant) uniform Push { BloomPush push; };
+
+vec3 bloom_sample(vec2 at) { return textureLod(sampler2D(coarser, linear), at / vec2(textureSize(coarser, 0)), 0.0).rgb; }
+
+#include "render/lib/bloom.gpu.h"
+
+void main() {
+    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    if (texel.x >= push.width || texel.y >= push.height) return;
+    vec2 at = (vec2(texel) + 0.5) * vec2(textureSize(coarser, 0)) / vec2(push.width, push.height);
+    imageStore(target, texel, vec4(mix(texelFetch(level, texel, 0).rgb, bloom_up(at), push.coarser), 1.0));
+}
