@@ -145,6 +145,8 @@ struct LensGpu : testing::Test {
 TEST_F(LensGpu, KernelsDevelopAsTheHostDoes) {
     Frame frame = frame_of(on_ground());
     frame.materials[1].emissive = {30, 10, 2};
+    frame.environment->intensity = 0.01f;  // luminances of all sizes
+    frame.lights = {{.kind = Light::Kind::Point, .position = {0.6f, 0.4f, 0.9f}, .intensity = 4}};
     const Camera cameras[] = {{.tone_map = ToneMap::Agx},
                               {.tone_map = ToneMap::Aces, .bloom = 0.2f},
                               {.tone_map = ToneMap::Neutral, .auto_exposure = true, .bloom = 0.5f, .bloom_size = 0.3f},
