@@ -20,9 +20,7 @@ CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_siz
     const float more = program.index.blend_allowance(edit.influence(far), far, row);
     const Box3 box = edit.influence(far + more);
     const double side = double(voxel_size) * kBrickVoxels;
-    const auto cell = [&](double at) {
-        return int(std::clamp(std::floor(at), double(-kFarCell), double(kFarCell)));
-    };
+    const auto cell = [&](double at) { return int(std::clamp(std::floor(at), double(-kFarCell), double(kFarCell))); };
     const auto low = [&](float a) { return cell(double(a) / side - 0.01); };
     const auto high = [&](float a) { return cell(double(a) / side + 0.01) + 1; };
     return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
@@ -78,8 +76,7 @@ bool CellMaker::evaluate(ivec3 cell, int i) {
     ball_ = i;
     ++cells_evaluated_;
     const ivec3 at = cell + lattice_.first;
-    const float least =
-        evaluator_.evaluate(code_, {at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels});
+    const float least = evaluator_.evaluate(code_, {at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels});
     return least < lattice_.own_voxels * lattice_.voxel_size;
 }
 

@@ -24,10 +24,10 @@ inline constexpr int kGroupCells = 4;
 inline float influence_reach(float voxel_size) { return (kBandVoxels + 0.01f) * voxel_size; }
 
 struct CellLattice {
-    ivec3 first;             ///< world cell that cells are counted from
-    float voxel_size = 0;    ///< metres
-    float own_voxels = 1;    ///< a cell owns a brick iff some texel's |value| is below this many voxels
-    float farthest = 0;      ///< largest coordinate that is asked about, metres: decides what rounding may add
+    ivec3 first;           ///< world cell that cells are counted from
+    float voxel_size = 0;  ///< metres
+    float own_voxels = 1;  ///< a cell owns a brick iff some texel's |value| is below this many voxels
+    float farthest = 0;    ///< largest coordinate that is asked about, metres: decides what rounding may add
 };
 
 inline bool contains(const CellBox& b, ivec3 c) {

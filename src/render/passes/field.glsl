@@ -32,6 +32,8 @@ Corners field_corners(int slot, ivec3 voxel) {
     return c;
 }
 
+void field_enter(uint word, ivec3 texel) {}
+
 #include "field/march.gpu.h"
 
 #ifdef KILN_FIELD_SURFACE
