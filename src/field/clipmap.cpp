@@ -88,8 +88,7 @@ Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const
                          " are possible",
                      ErrorKind::Usage};
     if (options.cells < 32 || options.cells > 256 || !std::has_single_bit(uint32_t(options.cells)))
-        return Error{"clipmap: " + std::to_string(options.cells) +
-                         " cells a side; levels have 32, 64, 128 or 256",
+        return Error{"clipmap: " + std::to_string(options.cells) + " cells a side; levels have 32, 64, 128 or 256",
                      ErrorKind::Usage};
     Clipmap out;
     out.options_ = options;
@@ -380,7 +379,8 @@ bool Clipmap::apply(int level, Run& run) {
         void empty(ivec3 c, bool inside) {
             set_done(c);
             const uint32_t word = level.cells.at(c.x, c.y, c.z);
-            if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside) made.empties.push_back({c, inside});
+            if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside)
+                made.empties.push_back({c, inside});
         }
         bool keeps(ivec3 c, bool came) {
             const uint32_t word = level.cells.at(c.x, c.y, c.z);
@@ -474,8 +474,14 @@ void Clipmap::publish(int level, Made& made, const CellBox& window) {
         contents_.resize_pages(slot / Contents::kPageSize + 1);
         BrickRecord& record = records_.write(slot);
         live_code_ += uint64_t(leaf.code_count) - record.code_count;
-        record = {c.x * kBrickVoxels, c.y * kBrickVoxels, c.z * kBrickVoxels, base + leaf.code_first, leaf.code_count,
-                  uint32_t(level), 0, 0};
+        record = {c.x * kBrickVoxels,
+                  c.y * kBrickVoxels,
+                  c.z * kBrickVoxels,
+                  base + leaf.code_first,
+                  leaf.code_count,
+                  uint32_t(level),
+                  0,
+                  0};
         contents_.write(slot) = std::move(leaf.content);
         if (had) continue;
         if (word == kCellMissing) --l.counts.missing_cells;
@@ -567,9 +573,8 @@ bool Clipmap::work(const BakeBudget& budget) {
         l.counts.skipped = 2 * uint64_t(l.shell) / uint64_t(options_.cells) > budget.bricks;
         missing = missing || (!l.blocks.empty() && !l.counts.skipped);
     }
-    std::stable_sort(changes.begin(), changes.end(), [&](int a, int b) {
-        return levels_[size_t(a)].active->since < levels_[size_t(b)].active->since;
-    });
+    std::stable_sort(changes.begin(), changes.end(),
+                     [&](int a, int b) { return levels_[size_t(a)].active->since < levels_[size_t(b)].active->since; });
     const auto apply_all = [&](Run& with) {
         for (const int level : changes) {
             if (!apply(level, with)) return;
@@ -622,9 +627,8 @@ void Clipmap::settle() {
         l.counts.edits_waiting = (l.active ? l.active->changes : 0) + (l.waiting ? l.waiting->changes : 0);
         l.counts.refused_cells = 0;
         for (const ivec3 block : l.refused) {
-            each_cell(common(cells_of(block), window), [&](ivec3 c) {
-                l.counts.refused_cells += l.cells.at(c.x, c.y, c.z) == kCellMissing ? 1u : 0u;
-            });
+            each_cell(common(cells_of(block), window),
+                      [&](ivec3 c) { l.counts.refused_cells += l.cells.at(c.x, c.y, c.z) == kCellMissing ? 1u : 0u; });
         }
     }
 }

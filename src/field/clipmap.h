@@ -44,7 +44,7 @@ struct LevelCounts {
     uint32_t entered_cells = 0;  ///< by the last move()
     uint64_t cells_made = 0;     ///< by the last work(): looked at to the end
     uint32_t baked = 0;          ///< bricks, by the last work()
-    uint32_t evicted = 0;        ///< bricks whose cells left, by the last move(); given to coarser levels, by the last work()
+    uint32_t evicted = 0;  ///< bricks whose cells left, by the last move(); given to coarser levels, by the last work()
     uint32_t refused_cells = 0;  ///< of the missing: the pool has no room for them
     uint32_t edits_waiting = 0;  ///< changes that are queued here
     bool skipped = false;        ///< by the last work(): its shell alone exceeds the budget
@@ -89,9 +89,9 @@ public:
 
     /// Distance to the surface as it is drawn, where a brick says: metres.
     struct Sample {
-        int level = -1;       ///< -1: outside all levels, or nothing known
+        int level = -1;  ///< -1: outside all levels, or nothing known
         bool from_brick = false;
-        float distance = 0;   ///< not from_brick: only its sign is known
+        float distance = 0;  ///< not from_brick: only its sign is known
     };
     Sample sample(dvec3 p_world) const;
     /// First hit along a ray through all levels; see level_march.gpu.h. t in metres.
@@ -131,7 +131,7 @@ private:
         std::shared_ptr<const sdf::Program> program;
         std::vector<CellBox> boxes;  // world cells
         std::vector<uint32_t> removed, inserted;
-        std::vector<Part> parts;     // to do
+        std::vector<Part> parts;  // to do
         std::vector<Made> made;
         uint64_t since = 0;  // number of the work() before which it came
         uint32_t changes = 0;
@@ -140,8 +140,8 @@ private:
         ivec3 first;
         CellMap cells;
         std::shared_ptr<const sdf::Program> program;
-        std::vector<ivec3> blocks;   // that have missing cells
-        std::vector<ivec3> refused;  // likewise, but no room
+        std::vector<ivec3> blocks;     // that have missing cells
+        std::vector<ivec3> refused;    // likewise, but no room
         std::vector<CellBox> changed;  // since settle()
         std::optional<Batch> active, waiting;
         uint32_t shell = 0;  // cells that entered since the last work()

@@ -17,15 +17,15 @@ KILN_FN void cut_span(float from, float direction, float inverse, float reach, K
 
 // First hit between t_min >= 0 and t_max, finest voxels. On a miss hit.t is where the ray left the outermost level, or t_max.
 KILN_FN LevelHit level_march(TexelRay ray, float t_min, float t_max, bool accelerate) {
-    LevelHit out;
-    out.level = -1;
-    out.hit.state = kMarchMiss;
-    out.hit.slot = -1;
-    out.hit.cell = ivec3(0, 0, 0);
-    out.hit.voxel = ivec3(0, 0, 0);
-    out.hit.p = vec3(0.0f, 0.0f, 0.0f);
-    out.hit.cells = 0;
-    out.hit.voxels = 0;
+    LevelHit answer;
+    answer.level = -1;
+    answer.hit.state = kMarchMiss;
+    answer.hit.slot = -1;
+    answer.hit.cell = ivec3(0, 0, 0);
+    answer.hit.voxel = ivec3(0, 0, 0);
+    answer.hit.p = vec3(0.0f, 0.0f, 0.0f);
+    answer.hit.cells = 0;
+    answer.hit.voxels = 0;
     vec3 from = vec3(float(ray.whole.x - levels.focus_x) + (ray.part.x - levels.part_x),
                      float(ray.whole.y - levels.focus_y) + (ray.part.y - levels.part_y),
                      float(ray.whole.z - levels.focus_z) + (ray.part.z - levels.part_z));
@@ -75,17 +75,17 @@ KILN_FN LevelHit level_march(TexelRay ray, float t_min, float t_max, bool accele
             here_level = level;
             MarchHit found = field_march(level_grid(level), level_ray(ray, level), t * scale,
                                          min(end * scale + kHandOver, t_max * scale), accelerate);
-            out.hit.cells += found.cells;
-            out.hit.voxels += found.voxels;
+            answer.hit.cells += found.cells;
+            answer.hit.voxels += found.voxels;
             if (found.state == kMarchHit || found.state == kMarchInside) {
-                int cells = out.hit.cells;
-                int voxels = out.hit.voxels;
-                out.hit = found;
-                out.hit.t = found.t * float(1 << level);
-                out.hit.cells = cells;
-                out.hit.voxels = voxels;
-                out.level = level;
-                return out;
+                int cells = answer.hit.cells;
+                int voxels = answer.hit.voxels;
+                answer.hit = found;
+                answer.hit.t = found.t * float(1 << level);
+                answer.hit.cells = cells;
+                answer.hit.voxels = voxels;
+                answer.level = level;
+                return answer;
             }
             if (found.state == kMarchMissing && found.t * float(1 << level) < end) {
                 t = max(t, found.t * float(1 << level));
@@ -106,6 +106,6 @@ KILN_FN LevelHit level_march(TexelRay ray, float t_min, float t_max, bool accele
         t = end;
         if (t >= t_max) break;
     }
-    out.hit.t = min(t, t_max);
-    return out;
+    answer.hit.t = min(t, t_max);
+    return answer;
 }

@@ -55,11 +55,11 @@ KILN_FN int cell_of_texel(int a) { return a >= 0 ? a / kBrickVoxels : -((kBrickV
 KILN_FN TexelRay level_ray(TexelRay ray, int level) {
     float scale = 1.0f / float(1 << level);
     int mask = (1 << level) - 1;
-    TexelRay out = ray;
-    out.part = vec3((float(ray.whole.x & mask) + ray.part.x) * scale, (float(ray.whole.y & mask) + ray.part.y) * scale,
-                    (float(ray.whole.z & mask) + ray.part.z) * scale);
-    out.whole = ivec3(ray.whole.x >> level, ray.whole.y >> level, ray.whole.z >> level);
-    return out;
+    TexelRay seen = ray;
+    seen.part = vec3((float(ray.whole.x & mask) + ray.part.x) * scale, (float(ray.whole.y & mask) + ray.part.y) * scale,
+                     (float(ray.whole.z & mask) + ray.part.z) * scale);
+    seen.whole = ivec3(ray.whole.x >> level, ray.whole.y >> level, ray.whole.z >> level);
+    return seen;
 }
 
 // A ray that meets so many missing cells gives its finest level up, again and again.
@@ -75,6 +75,11 @@ struct LevelHit {
 
 #ifdef __cplusplus
 static_assert(sizeof(LevelsParams) == 48 && sizeof(LevelPlace) == 16);
+/// As kernels bind it.
+struct LevelsBlock {
+    LevelsParams params;
+    LevelPlace places[kMostLevels];
+};
 #endif
 KILN_FIELD_END
 

@@ -75,9 +75,10 @@ void expect_is_its_program(const Clipmap& map, int level, const std::string& whe
     const auto middle = [&](ivec3 c) {
         return vec3{(float(c.x) + 0.5f) * side, (float(c.y) + 0.5f) * side, (float(c.z) + 0.5f) * side};
     };
-    auto built = HostBricks::build(map.level_program(level), {.voxel_size = h,
-                                                              .bounds = {middle(window.min), middle(window.max - all_of(1))},
-                                                              .own_voxels = kLevelOwnVoxels});
+    auto built =
+        HostBricks::build(map.level_program(level), {.voxel_size = h,
+                                                     .bounds = {middle(window.min), middle(window.max - all_of(1))},
+                                                     .own_voxels = kLevelOwnVoxels});
     ASSERT_TRUE(built);
     ASSERT_EQ(built->field().grid().cell_x, window.min.x);
     ASSERT_EQ(built->field().grid().size_z, window.max.z - window.min.z);
@@ -150,7 +151,8 @@ uint64_t hash_of_bricks(const Clipmap& map) {
         each_cell(map.window(level), [&](ivec3 c) {
             const uint32_t word = map.cell_word(level, c);
             const bool brick = (word & kCellOccupied) != 0 && word != kCellMissing;
-            sum = hash_combine(sum, brick ? hash_of(map.content(word & kCellSlotMask)) : word & (kCellMissing | kCellInside));
+            sum = hash_combine(
+                sum, brick ? hash_of(map.content(word & kCellSlotMask)) : word & (kCellMissing | kCellInside));
         });
     }
     return sum;
@@ -180,7 +182,8 @@ TEST(Clipmap, MovingMakesTheCellsOfTheShellsAndNothingElse) {
     worlds::Random r(5);
     dvec3 at{0, 0.5, 0};
     for (int frame = 0; frame < 120; ++frame) {
-        const dvec3 to{at.x + double(r.in(-0.4f, 0.6f)), at.y + double(r.in(-0.2f, 0.2f)), at.z + double(r.in(-0.3f, 0.5f))};
+        const dvec3 to{at.x + double(r.in(-0.4f, 0.6f)), at.y + double(r.in(-0.2f, 0.2f)),
+                       at.z + double(r.in(-0.3f, 0.5f))};
         ivec3 old[4];
         for (int level = 0; level < 4; ++level) old[level] = map.first_cell(level);
         map.move(at = to);
@@ -309,7 +312,8 @@ TEST(Clipmap, ASmallChangeCostsWhatItReaches) {
     edits.push_back(worlds::edit(Sphere{.radius = 0.3f}, {500, 0.2f, 1}));
     map.edit(live.program(), live.become(edits));
     EXPECT_TRUE(map.work());
-    for (int level = 0; level < map.level_count(); ++level) EXPECT_EQ(map.counts(level).cells_made, 0u) << "out of sight";
+    for (int level = 0; level < map.level_count(); ++level)
+        EXPECT_EQ(map.counts(level).cells_made, 0u) << "out of sight";
 }
 
 // A cell that is there has, around it, the coarser level there too.
@@ -320,10 +324,11 @@ void expect_nested(const Clipmap& map, const std::string& when) {
         const CellBox coarse = map.window(level + 1);
         each_cell(map.window(level), [&](ivec3 c) {
             if (wrong > 3 || map.cell_word(level, c) == kCellMissing) return;
-            each_cell({{(c.x >> 1) - 1, (c.y >> 1) - 1, (c.z >> 1) - 1}, {(c.x >> 1) + 2, (c.y >> 1) + 2, (c.z >> 1) + 2}},
-                      [&](ivec3 n) {
-                          if (!contains(coarse, n) || map.cell_word(level + 1, n) == kCellMissing) ++wrong;
-                      });
+            each_cell(
+                {{(c.x >> 1) - 1, (c.y >> 1) - 1, (c.z >> 1) - 1}, {(c.x >> 1) + 2, (c.y >> 1) + 2, (c.z >> 1) + 2}},
+                [&](ivec3 n) {
+                    if (!contains(coarse, n) || map.cell_word(level + 1, n) == kCellMissing) ++wrong;
+                });
         });
     }
     EXPECT_EQ(wrong, 0) << when;

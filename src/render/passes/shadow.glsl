@@ -21,10 +21,21 @@ layout(set = 0, binding = 10, std430) readonly buffer Code { uvec2 code[]; };
 layout(set = 0, binding = 11, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
 layout(set = 0, binding = 12, std430) readonly buffer Numbers { float numbers[]; };
 #endif
+#ifdef KILN_LEVELS
+#ifdef KILN_EXACT
+const uint kLevelsBinding = 13u;
+#else
+const uint kLevelsBinding = 9u;
+#endif
+layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
+#endif
 layout(push_constant) uniform Push { ShadowPush push; };
 // False: code is only asked for horizons, no ray marches along it.
 layout(constant_id = 5) const bool kAlongCode = true;
 
+#ifdef KILN_LEVELS
+#include "render/passes/level_map.glsl"
+#endif
 #include "render/passes/map.glsl"
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
@@ -57,13 +68,45 @@ float grid_gap(vec3 local) {
     return length(max(max(-local, local - size), vec3(0.0)));
 }
 
+#ifdef KILN_LEVELS
+// What the finest level that has the place knows of it.
+vec2 level_shadow(ivec3 whole, vec3 part) {
+    vec3 away = abs(vec3(whole - ivec3(levels.focus_x, levels.focus_y, levels.focus_z)) +
+                    (part - vec3(levels.part_x, levels.part_y, levels.part_z)));
+    float largest = max(max(away.x, away.y), away.z);
+    float reach = level_reach(levels.cells);
+    for (int level = levels.first; level < levels.count; ++level) {
+        float size = float(1 << level);
+        if (largest >= reach * size) continue;
+        ivec3 texel = whole >> level;
+        ivec3 cell = ivec3(cell_of_texel(texel.x), cell_of_texel(texel.y), cell_of_texel(texel.z));
+        uint word = level_word(level, cell);
+        if (word == kCellMissing) continue;
+        vec3 in_cell = vec3(texel - cell * kBrickVoxels) + (vec3(whole & ((1 << level) - 1)) + part) / size;
+        if ((word & kCellOccupied) != 0u) {
+            float d = sampled_distance(int(word & kCellSlotMask), in_cell);
+            return vec2(d >= kSaturatedVoxels ? kFarAway : d * size, max(abs(d) - kTrilinearErrorVoxels, 0.01) * size);
+        }
+        vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
+        float rim = min(min(to_face.x, to_face.y), to_face.z) + float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
+        float least = (max(rim, 0.0) + kClearOfEmptyCell) * size;
+        return (word & kCellInside) != 0u ? vec2(-least, least) : vec2(kFarAway, least);
+    }
+    return vec2(kFarAway, 1.0);
+}
+#endif
+
 // For soft_shadow.gpu.h, in voxels.
 vec2 shadow_field(vec3 p) {
     ivec3 whole = shadow_whole - grid_first_cell() * kBrickVoxels;
     vec3 local = vec3(whole) + p;
     ivec3 cell = ivec3(floor(local / float(kBrickVoxels)));
     bool inside_grid = in_grid(cell);
+#ifdef KILN_LEVELS
+    uint word = 0u;
+#else
     uint word = inside_grid ? field_cell(cell) : 0u;
+#endif
     bool occupied = (word & kCellOccupied) != 0u;
     int slot = int(word & kCellSlotMask);
 #ifdef KILN_EXACT
@@ -82,6 +125,10 @@ vec2 shadow_field(vec3 p) {
     }
 #endif
     if (!inside_grid) return vec2(kFarAway, grid_gap(local) + 0.25);
+#ifdef KILN_LEVELS
+    vec3 below = floor(p);
+    return level_shadow(shadow_whole + ivec3(below), p - below);
+#else
     vec3 in_cell = local - vec3(cell * kBrickVoxels);
     if (occupied) {
         float d = sampled_distance(slot, in_cell);
@@ -92,6 +139,7 @@ vec2 shadow_field(vec3 p) {
     float rim = min(min(to_face.x, to_face.y), to_face.z) + float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
     float least = max(rim, 0.0) + kClearOfEmptyCell;
     return (word & kCellInside) != 0u ? vec2(-least, least) : vec2(kFarAway, least);
+#endif
 }
 
 #include "render/lib/soft_shadow.gpu.h"
@@ -118,8 +166,9 @@ void main() {
         float t = uintBitsToFloat(seen.x);
         float h = frame.grid.voxel_size;
         // One voxel off the surface; a pixel, where pixels are larger than voxels.
-        float off = max(1.0, 1.5 * frame.pixel_angle * t);
-        if (state != kSeenOutside) off = min(off, 2.0);  // what bricks hold is exact to a voxel: farther would leave small hollows
+        float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
+        float off = max(voxel, 1.5 * frame.pixel_angle * t);
+        if (state != kSeenOutside) off = min(off, 2.0 * voxel);  // what bricks hold is exact to a voxel: farther would leave small hollows
         vec3 from = ray.part + ray.direction * t + surface.normal * off;
         shadow_whole = ray.whole + ivec3(floor(from));
         vec3 p = from - floor(from);
