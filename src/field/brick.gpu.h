@@ -40,7 +40,8 @@ struct BrickRecord {
     uint code_first;                // pruned code of the brick's ball, in instructions (8 bytes each)
     uint code_count;                // 0: a free slot
     uint level;                     // of a clipmap; its texels are 2^level times the finest
-    uint pad_0, pad_1;
+    uint far;                       // 1: world coordinates there are too coarse in floats to run the code
+    uint pad_0;
 };
 
 // The grid (32 bytes).

@@ -11,6 +11,14 @@ constexpr int kFarCell = 1 << 28;            // beyond any cell that has texels
 
 }  // namespace
 
+vec3 origin_of_block(ivec3 block, float voxel_size) {
+    const auto axis = [&](int first) {
+        const bool near = first < kNearCells && first + kBlockCells > -kNearCells;
+        return near ? 0.0f : float((double(first) + 0.5 * kBlockCells) * kBrickVoxels * double(voxel_size));
+    };
+    return {axis(block.x), axis(block.y), axis(block.z)};
+}
+
 CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size) {
     const sdf::EditSpan& span = program.edits[row];
     if (span.count == 0) return {};
@@ -21,8 +29,12 @@ CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_siz
     const Box3 box = edit.influence(far + more);
     const double side = double(voxel_size) * kBrickVoxels;
     const auto cell = [&](double at) { return int(std::clamp(std::floor(at), double(-kFarCell), double(kFarCell))); };
-    const auto low = [&](float a) { return cell(double(a) / side - 0.01); };
-    const auto high = [&](float a) { return cell(double(a) / side + 0.01) + 1; };
+    // Far out, boxes are rounded where they lie.
+    const auto more_cells = [&](float a) {
+        return 0.01 + (std::fabs(double(a)) > kNearCells * side ? 1e-6 * std::fabs(double(a)) / side : 0.0);
+    };
+    const auto low = [&](float a) { return cell(double(a) / side - more_cells(a)); };
+    const auto high = [&](float a) { return cell(double(a) / side + more_cells(a)) + 1; };
     return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
 }
 
@@ -41,19 +53,25 @@ void CellMaker::find_rows(const CellBox& box) {
     const auto world = [&](ivec3 c) {
         return vec3{float(c.x + first.x) * side, float(c.y + first.y) * side, float(c.z + first.z) * side};
     };
-    const Box3 wide = Box3{world(box.min), world(box.max)}.inflated(0.01f * lattice_.voxel_size);
+    // Boxes of edits are rounded where they lie.
+    const float rounding = rebased_ != nullptr ? 1e-6f * lattice_.farthest : 0.0f;
+    const Box3 wide = Box3{world(box.min), world(box.max)}.inflated(0.01f * lattice_.voxel_size + rounding);
     rows_.clear();
     program_->index.find(wide, far_ + program_->index.blend_allowance(wide, far_), rows_);
     std::sort(rows_.begin(), rows_.end(),
               [&](uint32_t a, uint32_t b) { return program_->edits[a].order < program_->edits[b].order; });
+    if (rebased_ != nullptr) rebased_->move_to(lattice_.origin, rows_);
 }
 
 // Ball i around the cube of `size` cells whose least corner is `cell`: every texel of it lies inside, whatever float made of positions.
 void CellMaker::place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const {
-    const auto middle = [&](int c) { return (float(c) * 7.0f + 3.5f * float(size)) * lattice_.voxel_size; };
-    balls.x[i] = middle(cell.x + lattice_.first.x);
-    balls.y[i] = middle(cell.y + lattice_.first.y);
-    balls.z[i] = middle(cell.z + lattice_.first.z);
+    const auto middle = [&](int c, float origin) {
+        if (origin == 0) return (float(c) * 7.0f + 3.5f * float(size)) * lattice_.voxel_size;
+        return float((double(c) * 7 + 3.5 * size) * double(lattice_.voxel_size) - double(origin));
+    };
+    balls.x[i] = middle(cell.x + lattice_.first.x, lattice_.origin.x);
+    balls.y[i] = middle(cell.y + lattice_.first.y, lattice_.origin.y);
+    balls.z[i] = middle(cell.z + lattice_.first.z, lattice_.origin.z);
 }
 
 // One radius for all.

@@ -9,6 +9,7 @@
 #include "field/brick_content.h"
 #include "field/jumps.h"
 #include "sdf/cull.h"
+#include "sdf/rebase.h"
 
 #include <algorithm>
 #include <optional>
@@ -23,11 +24,15 @@ inline constexpr int kGroupCells = 4;
 /// How near an edit must come to change what is stored, metres.
 inline float influence_reach(float voxel_size) { return (kBandVoxels + 0.01f) * voxel_size; }
 
+/// What points of a block count from, floats: 0 on axes where the block is near the world's origin (texel_position).
+vec3 origin_of_block(ivec3 block, float voxel_size);
+
 struct CellLattice {
     ivec3 first;           ///< world cell that cells are counted from
     float voxel_size = 0;  ///< metres
     float own_voxels = 1;  ///< a cell owns a brick iff some texel's |value| is below this many voxels
     float farthest = 0;    ///< largest coordinate that is asked about, metres: decides what rounding may add
+    vec3 origin;           ///< world metres that points count from; not 0 only for one block, its origin_of_block()
 };
 
 inline bool contains(const CellBox& b, ivec3 c) {
@@ -52,16 +57,17 @@ bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& progra
 ///     void air(const CellBox& cells)        these are empty and outside, also those it does not want
 ///     void empty(ivec3 cell, bool inside)
 ///     bool keeps(ivec3 cell, bool came)     its brick is as it was; `came`: one of `inserted` may be in its code
-///     void brick(ivec3 cell, CellMaker&)    code(), evaluator() and only_material() are its
+///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
 class CellMaker {
 public:
     CellMaker(const sdf::Program& program, const CellLattice& lattice, std::span<const uint32_t> inserted = {})
         : program_(&program),
+          rebased_(lattice.origin == vec3{} ? nullptr : &sdf::Rebased::of(program)),
           lattice_(lattice),
           inserted_(inserted),
           far_(influence_reach(lattice.voxel_size)),
-          culler_(program),
-          evaluator_(program, lattice.voxel_size) {}
+          culler_(rebased_ != nullptr ? rebased_->program() : program),
+          evaluator_(rebased_ != nullptr ? rebased_->program() : program, lattice.voxel_size, lattice.origin) {}
 
     /// The cells of the block whose first is `at`; `bounds` cuts off what no one wants.
     template <typename Sink>
@@ -70,7 +76,13 @@ public:
     template <typename Sink>
     void run_box(const CellBox& box, Sink& sink);
 
-    const std::vector<sdf::Instruction>& code() const { return code_; }
+    /// As the program itself has it.
+    void append_code(std::vector<sdf::Instruction>& to) const {
+        to.insert(to.end(), code_.begin(), code_.end());
+        if (rebased_ == nullptr) return;
+        for (auto in = to.end() - ptrdiff_t(code_.size()); in != to.end(); ++in) *in = rebased_->original(*in);
+    }
+    uint32_t code_count() const { return uint32_t(code_.size()); }
     const BrickEvaluator& evaluator() const { return evaluator_; }
     std::optional<uint16_t> only_material() const { return culler_.only_material(cells_, ball_); }
     uint64_t cells_tested() const { return cells_tested_; }        ///< balls folded at any level of the hierarchy
@@ -94,6 +106,7 @@ private:
     void run_cells(Sink& sink);
 
     const sdf::Program* program_;
+    sdf::Rebased* rebased_;  // null where points count from the world's origin
     CellLattice lattice_;
     std::span<const uint32_t> inserted_;
     float far_;

@@ -142,7 +142,8 @@ ivec3 Clipmap::first_cell_for(int level, dvec3 focus, const ivec3* old) const {
 
 CellLattice Clipmap::lattice(int level, ivec3 block) const {
     const int far = std::max({std::abs(block.x), std::abs(block.y), std::abs(block.z)}) + 2 * kBlockCells;
-    return {{}, voxel_size(level), kLevelOwnVoxels, float(far) * kBrickVoxels * voxel_size(level)};
+    const float h = voxel_size(level);
+    return {{}, h, kLevelOwnVoxels, float(far) * kBrickVoxels * h, origin_of_block(block, h)};
 }
 
 float Clipmap::distance_cells(int level, ivec3 cell) const {
@@ -275,9 +276,9 @@ struct SinkBase {
     }
     void add_brick(ivec3 cell, CellMaker& maker) {
         ++made.cells;
-        made.leaves.push_back({cell, uint32_t(made.code.size()), uint32_t(maker.code().size()),
+        made.leaves.push_back({cell, uint32_t(made.code.size()), maker.code_count(),
                                maker.evaluator().content(format, maker.only_material())});
-        made.code.insert(made.code.end(), maker.code().begin(), maker.code().end());
+        maker.append_code(made.code);
     }
 };
 
@@ -474,14 +475,9 @@ void Clipmap::publish(int level, Made& made, const CellBox& window) {
         contents_.resize_pages(slot / Contents::kPageSize + 1);
         BrickRecord& record = records_.write(slot);
         live_code_ += uint64_t(leaf.code_count) - record.code_count;
-        record = {c.x * kBrickVoxels,
-                  c.y * kBrickVoxels,
-                  c.z * kBrickVoxels,
-                  base + leaf.code_first,
-                  leaf.code_count,
-                  uint32_t(level),
-                  0,
-                  0};
+        const bool far = std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) >= kNearCells;
+        record = {c.x * kBrickVoxels, c.y * kBrickVoxels, c.z * kBrickVoxels, base + leaf.code_first,
+                  leaf.code_count,    uint32_t(level),    far ? 1u : 0u,      0};
         contents_.write(slot) = std::move(leaf.content);
         if (had) continue;
         if (word == kCellMissing) --l.counts.missing_cells;

@@ -125,16 +125,16 @@ private:
                    !uses_any(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_);
         }
         void brick(ivec3 cell, CellMaker& maker) {
-            Leaf leaf{cell, uint32_t(result.code.size()), uint32_t(maker.code().size()), true, {}};
+            Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), true, {}};
             if (builder.made_ != nullptr)
                 leaf.content = maker.evaluator().content(builder.options_.format, maker.only_material());
-            result.code.insert(result.code.end(), maker.code().begin(), maker.code().end());
+            maker.append_code(result.code);
             result.leaves.push_back(std::move(leaf));
         }
     };
 
     CellMaker maker() const {
-        return {*program_, {first_cell(), options_.voxel_size, options_.own_voxels, farthest()}, inserted_};
+        return {*program_, {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}, inserted_};
     }
     static void count(const CellMaker& maker, TaskResult& result) {
         result.cells_tested += maker.cells_tested();

@@ -540,6 +540,78 @@ TEST(Clipmap, NoRaySlipsThroughWhereLevelsHandOver) {
     }
 }
 
+// A float's step there is 0.4 of a voxel.
+TEST(Clipmap, IsExactAHundredKilometresFromTheOrigin) {
+    const vec3 there{100000.25f, 1.5f, -70000.5f};
+    const auto at = [&](float x, float y, float z) { return there + vec3{x, y, z}; };  // multiples of 2^-6: exact
+    std::vector<Edit> edits{
+        worlds::edit(Plane{}), worlds::edit(Sphere{.radius = 0.3f}, there),
+        worlds::edit(Box{.half_extents = {0.3f, 0.2f, 0.25f}}, at(0.5f, 0.25f, 0.125f), Op::Union, 0.1f),
+        worlds::edit(Sphere{.radius = 0.15f}, at(-0.125f, 0.25f, 0), Op::Subtract)};
+    edits[2].node.transform.rotation = axis_angle(normalize(vec3{1, 2, 0.5f}), 0.7f);
+    edits[2].node.material = MaterialId{3, 0};
+    worlds::Live live(edits);
+    const auto program = live.program();
+    const dvec3 focus{double(there.x) + 0.6, 1.6, double(there.z) + 0.3};
+    const ClipmapOptions options{.voxel_size = 0.02f, .levels = 3, .cells = 32};
+    Clipmap map = made(program, focus, options);
+    map.work();
+    const auto check = [&](const sdf::Program& now) {
+        for (int level = 0; level < 3; ++level) {
+            const float h = map.voxel_size(level);
+            double worst = 0;
+            int texels = 0, own = 0;
+            std::map<std::array<int, 3>, float> seen;
+            each_cell(map.window(level), [&](ivec3 c) {
+                const uint32_t word = map.cell_word(level, c);
+                if ((word & kCellOccupied) == 0 || (level > 0 && c.y != 0 && (c.x + c.z) % 5 != 0)) return;
+                const BrickContent& brick = map.content(word & kCellSlotMask);
+                EXPECT_EQ(map.records()[word & kCellSlotMask].far, 1u);
+                bool near = false;
+                for (int i = 0; i < 512; ++i) {
+                    const ivec3 t{c.x * 7 + (i & 7), c.y * 7 + (i >> 3 & 7), c.z * 7 + (i >> 6)};
+                    const dvec3 p{texel_position(t.x, h), texel_position(t.y, h), texel_position(t.z, h)};
+                    EXPECT_LE(std::fabs(p.x - double(t.x) * double(h)), double(h) * 2e-5);
+                    const double want = exact(now, p) / double(h), got = double(brick.distance(size_t(i)));
+                    near = near || std::fabs(want) < double(kLevelOwnVoxels);
+                    if (std::fabs(want) < 3.9) worst = std::max(worst, std::fabs(got - want));
+                    const auto [first, fresh] = seen.try_emplace({t.x, t.y, t.z}, brick.distance(size_t(i)));
+                    if (!fresh) {
+                        EXPECT_EQ(first->second, brick.distance(size_t(i))) << "a shared texel";
+                    }
+                    ++texels;
+                }
+                EXPECT_TRUE(near);
+                own += near;
+            });
+            EXPECT_GT(own, level == 0 ? 150 : 50);
+            EXPECT_LE(worst, 0.002) << "level " << level << ", " << texels
+                                    << " texels";  // half a step of a half is 2^-10
+        }
+    };
+    check(*program);
+    int hits = 0;
+    worlds::Random r(3);
+    for (int i = 0; i < 2000; ++i) {
+        const vec3 d = r.direction();
+        const Clipmap::Hit hit = map.cast({double(there.x) + 0.6, 2.2, double(there.z) + 0.9}, d, 1e6);
+        if (hit.state != kMarchHit) continue;
+        ++hits;
+        const dvec3 p{double(there.x) + 0.6 + hit.t * double(d.x), 2.2 + hit.t * double(d.y),
+                      double(there.z) + 0.9 + hit.t * double(d.z)};
+        EXPECT_LE(std::fabs(exact(*program, p)), 0.7 * double(map.voxel_size(hit.level)));
+    }
+    EXPECT_GT(hits, 500);
+    edits.push_back(worlds::edit(Sphere{.radius = 0.2f}, at(0.25f, -1.5f, 0.5f), Op::Subtract));
+    map.edit(live.program(), live.become(edits));
+    map.work();
+    EXPECT_GT(map.counts(0).baked, 8u);
+    check(*live.program());
+    Clipmap fresh = made(live.program(), focus, options);
+    fresh.work();
+    EXPECT_EQ(hash_of_bricks(map), hash_of_bricks(fresh));
+}
+
 TEST(Clipmap, CopiesAreSnapshots) {
     std::vector<Edit> edits = country();
     worlds::Live live(edits);

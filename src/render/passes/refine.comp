@@ -30,6 +30,10 @@ void main() {
     uvec4 words = uvec4(kNotRefined, 0u, 0u, 0u);
     if ((seen.y >> 28u) == kSeenBrick) {
         BrickRecord record = records[seen.y & 0x0fffffffu];
+        if (record.far != 0u) {
+            imageStore(refined, pixel, words);
+            return;
+        }
         TexelRay ray = pixel_ray(pixel);
         float scale = float(1u << record.level);
         vec3 origin = (vec3(ray.whole) + ray.part) * frame.grid.voxel_size;

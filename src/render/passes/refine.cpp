@@ -64,6 +64,7 @@ std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams&
         const size_t last = size_t(group) + 1 < firsts.size() ? firsts[size_t(group) + 1] : asked.size();
         const std::span<const uint32_t> here(asked.data() + first, last - first);
         const field::BrickRecord& record = (*bricks.records)[slot_of(here[0])];
+        if (record.far != 0) return;
         const sdf::TapeView tape =
             sdf::view(*bricks.program, bricks.code.subspan(record.code_first, record.code_count));
         const float scale = float(1u << record.level), h = finest * scale;  // t counts voxels of the brick's level
