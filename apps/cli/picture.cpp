@@ -7,13 +7,16 @@
 
 #include <kiln/world.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
+#include <vector>
 
 namespace kiln::cli {
 
 namespace {
 
-constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks"};
+constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
@@ -38,11 +41,16 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     if (!known) {
         const std::string_view near = nearest_word(o.view, kViews);
         return usage("--view " + o.view + ": there is no such view; " +
-                     (near.empty() ? "use shaded, albedo, normal, depth, steps or bricks"
+                     (near.empty() ? "use shaded, albedo, normal, depth, steps, bricks or levels"
                                    : "did you mean " + std::string(near) + "?"));
     }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
+    if (!o.path.empty() && o.frames < 2) return usage("--path wants --frames, 2 or more");
+    if (o.path.empty() && (o.frames != 0 || o.budget != 0))
+        return usage("--frames and --budget work with --path; add it");
+    if (!o.path.empty() && (!o.camera.empty() || o.reference > 0))
+        return usage("--path has its own cameras and no --reference; leave --camera and --reference out");
     s.analytic = o.analytic;
     s.unpruned = o.unpruned;
     s.accelerate = !o.no_accelerate;
@@ -82,6 +90,19 @@ void introduce(const RenderStats& stats) {
         (display ? "; windows come with a later version" : "; no display found") + " → rendering to a file");
 }
 
+// One object a level, finest first.
+std::string levels_json(const RenderStats& stats) {
+    std::string out;
+    for (const RenderStats::Level& l : stats.levels) {
+        Json json;
+        json.number("voxel_size", l.voxel_size).number("bricks", l.bricks).number("queued", l.queued);
+        json.number("baked", l.baked).number("evicted", l.evicted).number("refused", l.refused);
+        json.number("entered", l.entered).flag("skipped", l.skipped);
+        out += (out.empty() ? "" : ", ") + json.object();
+    }
+    return "[" + out + "]";
+}
+
 std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame,
                    double load, double total) {
     std::string passes;
@@ -101,7 +122,94 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         .number("coarsened", frame.coarsened)
         .number("load_s", load)
         .number("total_s", total);
+    if (!stats.levels.empty()) json.raw("levels", levels_json(stats));
     return json.line();
+}
+
+// Cameras of --path, in order.
+Result<std::vector<Camera>> stops_of(const World& world, const std::string& path) {
+    std::vector<Camera> out;
+    if (path == "all") {
+        for (const auto& [name, camera] : world.cameras) out.push_back(camera);
+    } else {
+        for (size_t at = 0; at <= path.size();) {
+            const size_t end = std::min(path.find(',', at), path.size());
+            auto camera = world.camera(path.substr(at, end - at));
+            if (!camera) return Error{"--path " + path + ": " + camera.error().message, ErrorKind::Usage};
+            out.push_back(*camera);
+            at = end + 1;
+        }
+    }
+    if (out.size() < 2) return usage("--path " + path + ": a path has two cameras or more");
+    return out;
+}
+
+// Position, target and angle of view run along Catmull-Rom splines, an equal time from stop to stop.
+Camera along(const std::vector<Camera>& stops, double time) {
+    const double at = std::clamp(time, 0.0, 1.0) * double(stops.size() - 1);
+    const size_t i = std::min(size_t(at), stops.size() - 2);
+    const float t = float(at - double(i));
+    const Camera& b = stops[i];
+    const Camera& c = stops[i + 1];
+    const Camera& a = i > 0 ? stops[i - 1] : b;
+    const Camera& d = i + 2 < stops.size() ? stops[i + 2] : c;
+    const auto spline = [&](vec3 p, vec3 q, vec3 r, vec3 s) {
+        const vec3 linear = r - p, square = p * 2.0f - q * 5.0f + r * 4.0f - s, cube = q * 3.0f - p - r * 3.0f + s;
+        return q + (linear + (square + cube * t) * t) * (0.5f * t);
+    };
+    Camera out = b;
+    out.position = spline(a.position, b.position, c.position, d.position);
+    out.target = spline(a.target, b.target, c.target, d.target);
+    out.fov_y_deg = b.fov_y_deg + (c.fov_y_deg - b.fov_y_deg) * t;
+    out.exposure = b.exposure + (c.exposure - b.exposure) * t;
+    return out;
+}
+
+std::string numbered(const std::string& output, int frame) {
+    char number[16];
+    std::snprintf(number, sizeof number, "_%04d", frame);
+    return output.substr(0, output.size() - 4) + number + output.substr(output.size() - 4);
+}
+
+// A picture a frame, the levels of the world following the camera.
+int render_sequence(const PictureOptions& o, const RenderSettings& settings, const World& world, Progress& progress) {
+    const auto stops = stops_of(world, o.path);
+    if (!stops) return progress.stage(""), fail(stops.error());
+    auto renderer = Renderer::create({.device = o.device});
+    if (!renderer) return progress.stage(""), fail(renderer.error());
+    const FrameBudget budget = o.budget != 0 ? FrameBudget{.bricks = o.budget} : FrameBudget{};
+    std::string rows;
+    double worst_ms = 0;
+    for (int i = 0; i < o.frames; ++i) {
+        progress.stage("frame " + std::to_string(i + 1) + " of " + std::to_string(o.frames));
+        const Stopwatch baking;
+        auto frame = world.frame(along(*stops, double(i) / (o.frames - 1)), budget);
+        if (!frame) return progress.stage(""), fail(frame.error());
+        const double bake_ms = 1000 * baking.seconds();
+        auto picture = renderer->render(*frame, settings);
+        if (!picture) return progress.stage(""), fail(picture.error());
+        if (auto ok = picture->save(numbered(o.output, i)); !ok) return progress.stage(""), fail(ok.error());
+        const RenderStats& stats = renderer->stats();
+        worst_ms = std::max(worst_ms, bake_ms);
+        Json row;
+        row.number("frame", i)
+            .number("bake_ms", bake_ms)
+            .number("frame_ms", stats.frame_ms)
+            .number("bricks", stats.bricks);
+        if (!stats.levels.empty()) row.raw("levels", levels_json(stats));
+        rows += (rows.empty() ? "" : ", ") + row.object();
+    }
+    progress.stage("");
+    if (!o.quiet)
+        say("wrote    " + numbered(o.output, 0) + " to " + numbered(o.output, o.frames - 1) + "   worst bake " +
+            brief(worst_ms, "ms"));
+    if (!o.json) return kDone;
+    Json json;
+    json.text("device", renderer->stats().device)
+        .raw("size", "[" + std::to_string(settings.width) + ", " + std::to_string(settings.height) + "]");
+    json.text("output", o.output).raw("frames", "[" + rows + "]");
+    (void)put(json.line());
+    return finish_data();
 }
 
 }  // namespace
@@ -116,6 +224,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("loading " + o.scene);
     auto world = World::load(o.scene);
     if (!world) return progress.stage(""), fail(world.error());
+    if (!o.path.empty()) return render_sequence(o, *settings, *world, progress);
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);
     if (!frame) return progress.stage(""), fail(frame.error());

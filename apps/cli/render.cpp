@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// kiln render SCENE -o OUT: one picture.
+// kiln render SCENE -o OUT: one picture, or a sequence along a path.
 
 #include "cli/picture.h"
 #include "cli/talk.h"
@@ -16,13 +16,20 @@ void add_render(CLI::App& app, Run& run) {
                                         "Examples:\n"
                                         "  kiln render potter -o potter.png\n"
                                         "  kiln render my.kiln.json -o depth.exr --view depth --size 640x480\n"
-                                        "  kiln render quarry -o quarry.png --device cpu-vulkan --json");
+                                        "  kiln render quarry -o quarry.png --device cpu-vulkan --json\n"
+                                        "  kiln render archipelago -o fly.png --path all --frames 240");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
     verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     verb->add_option("--camera", o->camera, "a camera's name; left out: the scene's first");
-    verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps or bricks")->capture_default_str();
+    verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps, bricks or levels")
+        ->capture_default_str();
     verb->add_option("--device", o->device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
+    verb->add_option("--path", o->path,
+                     "names of the scene's cameras in order, by commas, or all: draws --frames pictures along a smooth "
+                     "path through them, OUT_0000.png and so on");
+    verb->add_option("--frames", o->frames, "how many pictures --path draws");
+    verb->add_option("--budget", o->budget, "with --path: bricks that a frame may bake; 0 is no limit");
     verb->add_flag("--analytic", o->analytic, "march the edits themselves instead of the bricks");
     verb->add_option("--reference", o->reference,
                      "path-trace on the CPU with this many samples a pixel (no device needed)");

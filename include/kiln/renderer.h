@@ -18,8 +18,9 @@
 namespace kiln {
 
 namespace field {
+class Clipmap;
 class Field;
-}
+}  // namespace field
 namespace render::shade {
 struct EnvironmentMap;
 }
@@ -63,12 +64,13 @@ struct Environment {
     std::string file{};  ///< equirectangular OpenEXR image, its middle towards -Z; relative to the scene's file
 };
 
-enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks };
+enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };
 
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
-    std::shared_ptr<const field::Field> field;  ///< immutable snapshot
-    std::vector<Material> materials;            ///< indexed by the field's material numbers
+    std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
+    std::shared_ptr<const field::Clipmap> levels;  ///< those, likewise
+    std::vector<Material> materials;               ///< indexed by the field's material numbers
     std::vector<Light> lights;
     std::optional<Environment> environment;  ///< none: a clear sky, with the disc of the first directional light
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
@@ -111,6 +113,15 @@ struct RenderStats {
     uint64_t pipelines_created = 0;  ///< since creation; constant once warm
     int coarsened = 0;               ///< times the voxel size was doubled to fit the pool
     float exposure = 1;              ///< what radiance was multiplied with, chosen or measured
+    /// Of a clipmap, finest first.
+    struct Level {
+        double voxel_size = 0;                         ///< metres
+        uint32_t bricks = 0;                           ///< resident
+        uint32_t queued = 0, refused = 0;              ///< cells; refused ones found no room in the pool
+        uint32_t baked = 0, evicted = 0, entered = 0;  ///< bricks, bricks and cells, of the last frame
+        bool skipped = false;                          ///< its shell was more than the budget
+    };
+    std::vector<Level> levels;
 };
 
 struct DeviceInfo {

@@ -11,6 +11,7 @@
 #include <kiln/result.h>
 #include <kiln/shapes.h>
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -25,6 +26,12 @@ struct FieldSettings {
     int levels = 1;
     std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %
     bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16
+};
+
+/// What a frame of a world of several levels may bake; what does not fit is shown coarser until a later frame.
+struct FrameBudget {
+    uint32_t bricks = UINT32_MAX;
+    double seconds = 1e30;
 };
 
 /// How a model file is taken into a scene.
@@ -84,6 +91,10 @@ public:
     Box3 bounds() const;
     /// What a renderer needs, with an immutable snapshot of the field. Camera by name; the first (or an automatic one) when empty.
     Result<Frame> frame(std::string_view camera = {}) const;
+    /// The same seen through any camera; of a world of several levels, a frame of a sequence: levels follow the camera from frame to frame.
+    Result<Frame> frame(const Camera& camera, const FrameBudget& budget = {}) const;
+    /// By name; the first (or an automatic one) when empty.
+    Result<Camera> camera(std::string_view name = {}) const;
     /// The surface as triangles. Fails where nothing is solid, and where `cell` asks for more than memory holds.
     Result<Mesh> mesh(const MeshSettings& settings = {}) const;
 

@@ -21,6 +21,9 @@ KILN_CONST float kTrilinearErrorVoxels =
 KILN_CONST uint kCellOccupied = 0x80000000u;
 KILN_CONST uint kCellInside = 0x40000000u;
 KILN_CONST uint kCellSlotMask = 0x00ffffffu;
+// On levels: nothing is known here yet, ask the next coarser level; and, of an occupied cell, one around it is missing.
+KILN_CONST uint kCellMissing = 0x80ffffffu;
+KILN_CONST uint kCellFades = 0x20000000u;
 KILN_CONST int kMaxJump = 7;
 
 // Cell words lie in pages of kCellPage cells a side, x fastest in both: the word of a cell counted from the grid's first, for a map of
@@ -36,7 +39,9 @@ struct BrickRecord {
     int texel_x, texel_y, texel_z;  // global texel index of texel (0, 0, 0): 7 * cell
     uint code_first;                // pruned code of the brick's ball, in instructions (8 bytes each)
     uint code_count;                // 0: a free slot
-    uint pad_0, pad_1, pad_2;
+    uint level;                     // of a clipmap; its texels are 2^level times the finest
+    uint far;                       // 1: world coordinates there are too coarse in floats to run the code
+    uint pad_0;
 };
 
 // The grid (32 bytes).

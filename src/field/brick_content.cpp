@@ -59,12 +59,22 @@ uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDef
 
 }  // namespace
 
+double texel_position(int texel, float voxel_size) {
+    if (std::abs(texel) <= kNearCells * kBrickVoxels) return double(float(texel) * voxel_size);
+    // 2^-16 of the power of two at or above the voxel.
+    const double step = std::exp2(std::ceil(std::log2(double(voxel_size))) - 16);
+    return std::round(double(texel) * double(voxel_size) / step) * step;
+}
+
 float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 first) {
     code_ = code;
+    const auto position = [&](int texel, float origin) {
+        return origin == 0 ? float(texel) * voxel_size_ : float(texel_position(texel, voxel_size_) - double(origin));
+    };
     for (int i = 0; i < kBrickTexels; ++i) {
-        x_[i] = float(first.x + i) * voxel_size_;  // never origin + i * h: neighbours must see the same position
-        y_[i] = float(first.y + i) * voxel_size_;
-        z_[i] = float(first.z + i) * voxel_size_;
+        x_[i] = position(first.x + i, origin_.x);  // never corner + i * h: neighbours must see the same position
+        y_[i] = position(first.y + i, origin_.y);
+        z_[i] = position(first.z + i, origin_.z);
     }
     return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
 }

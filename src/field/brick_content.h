@@ -43,11 +43,18 @@ struct BrickContent {
     uint32_t dropped() const { return materials ? materials->dropped : 0; }
 };
 
+/// Where a texel lies on one axis, metres. Up to kNearCells from the origin: index * voxel size, in floats. Beyond, that on a lattice of
+/// some 2^-16 voxel, which neither doubles nor floats that count from a place near by round. A function of the index alone: bricks
+/// agree about the texels they share.
+double texel_position(int texel, float voxel_size);
+inline constexpr int kNearCells = 2048;
+
 /// Evaluates bricks, one after another. One thread.
 class BrickEvaluator {
 public:
-    BrickEvaluator(const sdf::Program& program, float voxel_size)
-        : program_(&program), voxel_size_(voxel_size), voxels_per_metre_(1.0f / voxel_size) {}
+    /// `origin`: world metres that the program's points count from.
+    BrickEvaluator(const sdf::Program& program, float voxel_size, vec3 origin = {})
+        : program_(&program), voxel_size_(voxel_size), voxels_per_metre_(1.0f / voxel_size), origin_(origin) {}
 
     /// Distances of the texels of the brick that begins at global texel `first`; the smallest |distance|, metres.
     float evaluate(std::span<const sdf::Instruction> code, ivec3 first);
@@ -61,6 +68,7 @@ private:
 
     const sdf::Program* program_;
     float voxel_size_, voxels_per_metre_;
+    vec3 origin_;
     std::span<const sdf::Instruction> code_;
     alignas(64) float x_[kBrickTexels], y_[kBrickTexels], z_[kBrickTexels];
     alignas(64) std::array<float, kBrickTexelCount> distances_;

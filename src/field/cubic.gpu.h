@@ -193,7 +193,8 @@ KILN_FN ivec3 voxel_at(BrickRay ray, float s) {
 // What field_march() of march.gpu.h answers.
 KILN_CONST int kMarchMiss = 0;
 KILN_CONST int kMarchHit = 1;
-KILN_CONST int kMarchInside = 2;  // the ray starts in solid, or meets it, where there is no brick: t and cell are set
+KILN_CONST int kMarchInside = 2;   // the ray starts in solid, or meets it, where there is no brick: t and cell are set
+KILN_CONST int kMarchMissing = 3;  // the ray meets a cell that is kCellMissing: t and cell are set
 struct MarchHit {
     int state;
     float t;      // voxels along the ray

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A field is made in tasks: cubes of 16 cells. Each asks the index for the edits that reach it, folds their list at the centres of its 64
-// cubes of 4 cells, and for those that may hold a surface at their 64 cells (Barbier et al., "Lipschitz Pruning", 2025, branch in the
-// same way); what is left of the list is a cell's code, which is evaluated at its texels to see whether the cell owns a brick.
+// A field is made in tasks: blocks of 16 cells, see cell_maker.h.
 // An update looks at the cells that the changed edits reach, and at nothing else: a small one takes those cells 64 at a time wherever
 // they lie, a large one takes tasks. Results are merged in the order of tasks, so nothing depends on the number of workers.
 
@@ -10,7 +8,7 @@
 #include "base/assert.h"
 #include "base/parallel_for.h"
 #include "base/profile.h"
-#include "sdf/cull.h"
+#include "field/cell_maker.h"
 
 #include <algorithm>
 #include <array>
@@ -25,18 +23,12 @@ using Code = std::vector<sdf::Instruction>;
 
 namespace {
 
-constexpr int kTaskCells = 16;
-constexpr int kGroupCells = 4;
-constexpr int kTaskPages = kTaskCells / kCellPage;
+constexpr int kTaskPages = kBlockCells / kCellPage;
 constexpr int64_t kMaxCells = 1ll << 28;
-constexpr int64_t kMaxTexel = 1ll << 24;     // float holds every integer up to here
-constexpr float kHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
-constexpr int64_t kFewCells = 4096;          // an update of fewer takes them as they come
+constexpr int64_t kMaxTexel = 1ll << 24;  // float holds every integer up to here
+constexpr int64_t kFewCells = 4096;       // an update of fewer takes them as they come
 
 std::atomic<uint64_t> revisions{0};
-
-// Row i of a group of 64: x fastest.
-ivec3 place_of(int i) { return {i & 3, i >> 2 & 3, i >> 4}; }
 
 struct Leaf {
     ivec3 cell;                               // counted from the grid's first
@@ -69,8 +61,6 @@ public:
     Result<std::shared_ptr<const Field>> run() {
         KILN_PROFILE(old_ != nullptr ? "field update" : "field build");
         if (auto ok = lay_grid(); !ok) return ok.error();
-        far_ = (kBandVoxels + 0.01f) * options_.voxel_size;
-        farthest_ = farthest();
         if (old_ == nullptr) {
             build_tasks({{0, 0, 0}, size_});
         } else {
@@ -86,8 +76,12 @@ public:
                 build_tasks(all);
             } else if (cells > 0) {
                 results_.resize(dirty_.size());
-                Worker worker = make_worker();
-                for (size_t i = 0; i < dirty_.size(); ++i) few_cells(i, worker, results_[i]);
+                CellMaker maker = this->maker();
+                for (size_t i = 0; i < dirty_.size(); ++i) {
+                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i)};
+                    maker.run_box(dirty_[i], sink);
+                }
+                count(maker, results_[0]);
             }
         }
         if (auto ok = merge(); !ok) return ok.error();
@@ -98,18 +92,53 @@ public:
     }
 
 private:
-    // What a thread works with; its memory is kept from task to task.
-    struct Worker {
-        sdf::ListCuller culler;
-        sdf::ListCuller::Fold groups, cells;
-        BrickEvaluator evaluator;
-        std::vector<uint32_t> rows;
-        Code code;
-        ivec3 cell[64];  // of `cells`' balls
+    // What a task's cells become; see CellMaker.
+    struct TaskSink {
+        FieldBuilder& builder;
+        ivec3 task;
+        TaskResult& result;
+        std::span<const CellBox> earlier = {};  // an update of few cells: boxes that have had their cells
+
+        bool whole() const { return builder.old_ == nullptr; }
+        bool wants(const CellBox& box) const { return whole() || builder.is_dirty(box); }
+        bool wants(ivec3 cell) const {
+            if (earlier.data() != nullptr)
+                return std::none_of(earlier.begin(), earlier.end(),
+                                    [&](const CellBox& b) { return contains(b, cell); });
+            return whole() || builder.is_dirty(cell);
+        }
+        static bool stop() { return false; }
+        void air(const CellBox& box) {
+            if (whole()) return;  // as unwritten cells read
+            for (int z = box.min.z; z < box.max.z; ++z) {
+                for (int y = box.min.y; y < box.max.y; ++y) {
+                    for (int x = box.min.x; x < box.max.x; ++x) {
+                        if (wants(ivec3{x, y, z})) empty({x, y, z}, false);
+                    }
+                }
+            }
+        }
+        void empty(ivec3 cell, bool inside) { builder.set_empty(cell, inside, task, result); }
+        bool keeps(ivec3 cell, bool came) const {
+            const uint32_t word = whole() ? 0u : builder.old_->cells_.at(cell.x, cell.y, cell.z);
+            return (word & kCellOccupied) != 0 && !came &&
+                   !uses_any(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_);
+        }
+        void brick(ivec3 cell, CellMaker& maker) {
+            Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), true, {}};
+            if (builder.made_ != nullptr)
+                leaf.content = maker.evaluator().content(builder.options_.format, maker.only_material());
+            maker.append_code(result.code);
+            result.leaves.push_back(std::move(leaf));
+        }
     };
 
-    Worker make_worker() const {
-        return {sdf::ListCuller(*program_), {}, {}, BrickEvaluator(*program_, options_.voxel_size), {}, {}, {}};
+    CellMaker maker() const {
+        return {*program_, {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}, inserted_};
+    }
+    static void count(const CellMaker& maker, TaskResult& result) {
+        result.cells_tested += maker.cells_tested();
+        result.cells_evaluated += maker.cells_evaluated();
     }
 
     Result<void> lay_grid() {
@@ -161,35 +190,10 @@ private:
 
     ivec3 first_cell() const { return {out_->grid_.cell_x, out_->grid_.cell_y, out_->grid_.cell_z}; }
 
-    bool in_grid(ivec3 c) const {
-        return c.x >= 0 && c.y >= 0 && c.z >= 0 && c.x < size_.x && c.y < size_.y && c.z < size_.z;
-    }
-
-    // The box of cells that an edit reaches, from the box of its influence.
-    CellBox cells_of(const Box3& box) const {
-        const double side = double(options_.voxel_size) * kBrickVoxels;
-        const ivec3 first = first_cell();
-        const auto low = [&](float a, int from, int size) {
-            return int(std::clamp(std::floor(double(a) / side - 0.01) - from, 0.0, double(size)));
-        };
-        const auto high = [&](float a, int from, int size) {
-            return int(std::clamp(std::floor(double(a) / side + 0.01) + 1 - from, 0.0, double(size)));
-        };
-        return {
-            {low(box.min.x, first.x, size_.x), low(box.min.y, first.y, size_.y), low(box.min.z, first.z, size_.z)},
-            {high(box.max.x, first.x, size_.x), high(box.max.y, first.y, size_.y), high(box.max.z, first.z, size_.z)}};
-    }
-
     void find_dirty() {
         const auto add = [&](uint32_t row) {
-            const sdf::EditSpan& span = program_->edits[row];
-            if (span.count == 0) return;
-            CellBox box{{0, 0, 0}, size_};
-            if (!span.everywhere()) {
-                const sdf::IndexedEdit edit = span.indexed(row);
-                const float more = program_->index.blend_allowance(edit.influence(far_), far_, row);
-                box = cells_of(edit.influence(far_ + more));
-            }
+            const CellBox world = cells_reached(*program_, row, options_.voxel_size);
+            const CellBox box = grown({world.min - first_cell(), world.max - first_cell()}, 0, size_);
             if (!box.empty()) dirty_.push_back(box);
         };
         for (const RowChange& change : changes_) {
@@ -208,70 +212,25 @@ private:
     bool is_dirty(ivec3 c) const {
         return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return contains(b, c); });
     }
-    static bool contains(const CellBox& b, ivec3 c) {
-        return c.x >= b.min.x && c.y >= b.min.y && c.z >= b.min.z && c.x < b.max.x && c.y < b.max.y && c.z < b.max.z;
-    }
     bool is_dirty(const CellBox& box) const {
-        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) {
-            return box.min.x < b.max.x && box.min.y < b.max.y && box.min.z < b.max.z && b.min.x < box.max.x &&
-                   b.min.y < box.max.y && b.min.z < box.max.z;
-        });
-    }
-
-    // Rows that reach the box of cells, in order.
-    void find_rows(const CellBox& box, std::vector<uint32_t>& rows) const {
-        const float side = options_.voxel_size * kBrickVoxels;
-        const ivec3 first = first_cell();
-        const auto world = [&](int x, int y, int z) {
-            return vec3{float(x + first.x) * side, float(y + first.y) * side, float(z + first.z) * side};
-        };
-        const Box3 metres = Box3{world(box.min.x, box.min.y, box.min.z), world(box.max.x, box.max.y, box.max.z)};
-        const Box3 wide = metres.inflated(0.01f * options_.voxel_size);
-        rows.clear();
-        program_->index.find(wide, far_ + program_->index.blend_allowance(wide, far_), rows);
-        std::sort(rows.begin(), rows.end(),
-                  [&](uint32_t a, uint32_t b) { return program_->edits[a].order < program_->edits[b].order; });
-    }
-
-    // Ball i around the cube of `size` cells whose least corner is `cell`: every texel of it lies inside, whatever float made of positions.
-    void place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const {
-        const float h = options_.voxel_size;
-        const ivec3 first = first_cell();
-        const auto middle = [&](int c) { return (float(c) * 7.0f + 3.5f * float(size)) * h; };
-        balls.x[i] = middle(cell.x + first.x);
-        balls.y[i] = middle(cell.y + first.y);
-        balls.z[i] = middle(cell.z + first.z);
-    }
-
-    // One radius for all: the grid's farthest corner decides what rounding may add.
-    void size_balls(sdf::Balls& balls, int size) const {
-        const float h = options_.voxel_size, rounding = 5e-7f * farthest_;
-        balls.radius = kHalfDiagonal * float(size) * h + rounding;
-        balls.half_side = 3.5f * float(size) * h + rounding;
-        balls.far = far_;
+        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return meet(box, b); });
     }
 
     float farthest() const {
         const GridParams& g = out_->grid_;
         const auto reach = [](int first, int size) { return std::max(std::abs(first), std::abs(first + size)); };
         const int cells = std::max({reach(g.cell_x, g.size_x), reach(g.cell_y, g.size_y), reach(g.cell_z, g.size_z)});
-        return float(cells + kTaskCells) * kBrickVoxels * options_.voxel_size;
-    }
-
-    // No texel of a ball whose centre has this value is near enough to the surface for a brick.
-    bool beyond(float value, const sdf::Balls& balls) const {
-        const float v = std::fabs(value);
-        return v > balls.radius + options_.own_voxels * options_.voxel_size + 4e-6f * (farthest_ + v);
+        return float(cells + kBlockCells) * kBrickVoxels * options_.voxel_size;
     }
 
     void build_tasks(const CellBox& all) {
         std::vector<ivec3> tasks;
-        const auto aligned = [](int a) { return a / kTaskCells * kTaskCells; };
-        for (int z = aligned(all.min.z); z < all.max.z; z += kTaskCells) {
-            for (int y = aligned(all.min.y); y < all.max.y; y += kTaskCells) {
-                for (int x = aligned(all.min.x); x < all.max.x; x += kTaskCells) {
+        const auto aligned = [](int a) { return a / kBlockCells * kBlockCells; };
+        for (int z = aligned(all.min.z); z < all.max.z; z += kBlockCells) {
+            for (int y = aligned(all.min.y); y < all.max.y; y += kBlockCells) {
+                for (int x = aligned(all.min.x); x < all.max.x; x += kBlockCells) {
                     const ivec3 at{x, y, z};
-                    if (old_ == nullptr || is_dirty(CellBox{at, at + ivec3{kTaskCells, kTaskCells, kTaskCells}}))
+                    if (old_ == nullptr || is_dirty(CellBox{at, at + ivec3{kBlockCells, kBlockCells, kBlockCells}}))
                         tasks.push_back(at);
                 }
             }
@@ -279,151 +238,11 @@ private:
         tasks_ = std::move(tasks);
         results_.resize(tasks_.size());
         parallel_for(tasks_.size(), options_.workers, [&](int i) {
-            Worker worker = make_worker();
-            run_task(tasks_[size_t(i)], worker, results_[size_t(i)]);
+            CellMaker maker = this->maker();
+            TaskSink sink{*this, tasks_[size_t(i)], results_[size_t(i)]};
+            maker.run_block(tasks_[size_t(i)], {{0, 0, 0}, size_}, sink);
+            count(maker, results_[size_t(i)]);
         });
-    }
-
-    void run_task(ivec3 at, Worker& worker, TaskResult& result) {
-        const CellBox box = grown({at, at + ivec3{kTaskCells, kTaskCells, kTaskCells}}, 0, size_);
-        find_rows(box, worker.rows);
-        if (worker.rows.empty() && old_ == nullptr) return;
-        sdf::ListCuller::Fold& groups = worker.groups;
-        groups.list = worker.culler.list_of(worker.rows);
-        groups.balls.live = 0;
-        for (int i = 0; i < 64; ++i) {
-            const ivec3 p = place_of(i),
-                        cell{at.x + p.x * kGroupCells, at.y + p.y * kGroupCells, at.z + p.z * kGroupCells};
-            place_ball(groups.balls, i, cell, kGroupCells);
-            const CellBox group = grown({cell, cell + ivec3{kGroupCells, kGroupCells, kGroupCells}}, 0, size_);
-            if (!group.empty() && (old_ == nullptr || is_dirty(group))) groups.balls.live |= uint64_t(1) << i;
-        }
-        size_balls(groups.balls, kGroupCells);
-        worker.culler.fold(groups);
-        uint64_t open = 0;
-        for (int i = 0; i < 64; ++i) {
-            if ((groups.balls.live >> i & 1u) == 0) continue;
-            ++result.cells_tested;
-            if (!beyond(groups.value[i], groups.balls)) {
-                open |= uint64_t(1) << i;
-                continue;
-            }
-            const bool inside = groups.value[i] < 0;
-            if (!inside && old_ == nullptr) continue;  // as unwritten cells read
-            for (int c = 0; c < 64; ++c) {
-                const ivec3 cell = cell_in(at, i, c);
-                if (in_grid(cell) && (old_ == nullptr || is_dirty(cell))) set_empty(cell, inside, at, result);
-            }
-        }
-        worker.culler.keep(groups, open);
-        for (int i = 0; i < 64; ++i) {
-            if ((open >> i & 1u) == 0) continue;
-            sdf::ListCuller::Fold& cells = worker.cells;
-            cells.list = worker.culler.child(groups, i);
-            cells.balls.live = 0;
-            for (int c = 0; c < 64; ++c) {
-                worker.cell[c] = cell_in(at, i, c);
-                place_ball(cells.balls, c, worker.cell[c], 1);
-                if (in_grid(worker.cell[c]) && (old_ == nullptr || is_dirty(worker.cell[c])))
-                    cells.balls.live |= uint64_t(1) << c;
-            }
-            run_cells(worker, at, result);
-            worker.culler.drop(cells.list);
-        }
-        worker.culler.drop(groups.list);
-    }
-
-    static ivec3 cell_in(ivec3 task, int group, int c) {
-        const ivec3 g = place_of(group), p = place_of(c);
-        return {task.x + g.x * kGroupCells + p.x, task.y + g.y * kGroupCells + p.y, task.z + g.z * kGroupCells + p.z};
-    }
-
-    // The cells of one dirty box that no earlier one has.
-    void few_cells(size_t which, Worker& worker, TaskResult& result) {
-        const CellBox& box = dirty_[which];
-        const std::span<const CellBox> earlier = std::span(dirty_).first(which);
-        find_rows(box, worker.rows);
-        sdf::ListCuller::Fold& cells = worker.cells;
-        cells.list = worker.culler.list_of(worker.rows);
-        int n = 0;
-        const auto run = [&] {
-            if (n == 0) return;
-            cells.balls.live = n == 64 ? ~uint64_t(0) : (uint64_t(1) << n) - 1;
-            for (int i = n; i < 64; ++i) place_ball(cells.balls, i, worker.cell[n - 1], 1);
-            run_cells(worker, {}, result);
-            n = 0;
-        };
-        for (int z = box.min.z; z < box.max.z; ++z) {
-            for (int y = box.min.y; y < box.max.y; ++y) {
-                for (int x = box.min.x; x < box.max.x; ++x) {
-                    const ivec3 cell{x, y, z};
-                    if (std::any_of(earlier.begin(), earlier.end(),
-                                    [&](const CellBox& b) { return contains(b, cell); }))
-                        continue;
-                    worker.cell[n] = cell;
-                    place_ball(cells.balls, n, cell, 1);
-                    if (++n == 64) run();
-                }
-            }
-        }
-        run();
-        worker.culler.drop(cells.list);
-    }
-
-    // worker.cells has its list, its balls' places and which of them to look at.
-    void run_cells(Worker& worker, ivec3 task, TaskResult& result) {
-        sdf::ListCuller::Fold& cells = worker.cells;
-        size_balls(cells.balls, 1);
-        worker.culler.fold(cells);
-        uint64_t open = 0;
-        for (int i = 0; i < 64; ++i) {
-            if ((cells.balls.live >> i & 1u) == 0) continue;
-            ++result.cells_tested;
-            if (beyond(cells.value[i], cells.balls)) {
-                set_empty(worker.cell[i], cells.value[i] < 0, task, result);
-            } else {
-                open |= uint64_t(1) << i;
-            }
-        }
-        if (open == 0) return;
-        worker.culler.keep(cells, open);
-        const uint64_t came = inserted_.empty() ? 0 : worker.culler.balls_with(cells, inserted_);
-        for (int i = 0; i < 64; ++i) {
-            if ((open >> i & 1u) != 0) finish_cell(worker, i, (came >> i & 1u) != 0, task, result);
-        }
-    }
-
-    void finish_cell(Worker& worker, int i, bool came, ivec3 task, TaskResult& result) {
-        const ivec3 cell = worker.cell[i];
-        const uint32_t old_word = old_ != nullptr ? old_->cells_.at(cell.x, cell.y, cell.z) : 0u;
-        const bool was = (old_word & kCellOccupied) != 0;
-        if (was && !came && !uses_removed(old_word & kCellSlotMask)) return;
-        worker.culler.emit(worker.cells, i, worker.code);
-        const ivec3 first = first_cell();
-        const ivec3 texel{(first.x + cell.x) * kBrickVoxels, (first.y + cell.y) * kBrickVoxels,
-                          (first.z + cell.z) * kBrickVoxels};
-        ++result.cells_evaluated;
-        const float least = worker.evaluator.evaluate(worker.code, texel);
-        if (!(least < options_.own_voxels * options_.voxel_size)) {
-            set_empty(cell, worker.evaluator.distances()[0] < 0, task, result);
-            return;
-        }
-        Leaf leaf{cell, uint32_t(result.code.size()), uint32_t(worker.code.size()), true, {}};
-        if (made_ != nullptr) {
-            leaf.content = worker.evaluator.content(options_.format, worker.culler.only_material(worker.cells, i));
-        }
-        result.code.insert(result.code.end(), worker.code.begin(), worker.code.end());
-        result.leaves.push_back(std::move(leaf));
-    }
-
-    bool uses_removed(uint32_t slot) const {
-        if (removed_.empty()) return false;
-        for (const sdf::Instruction in : old_->code_of(slot)) {
-            if (!in.has_material()) continue;
-            const uint32_t row = uint32_t(program_->params[in.param + 2]);
-            if (std::find(removed_.begin(), removed_.end(), row) != removed_.end()) return true;
-        }
-        return false;
     }
 
     void set_empty(ivec3 cell, bool inside, ivec3 task, TaskResult& result) {
@@ -565,8 +384,6 @@ private:
     std::span<const RowChange> changes_;
     MadeBricks* made_;
     ivec3 size_;
-    float far_ = 0;       // how near an edit must come to change what is stored, metres
-    float farthest_ = 0;  // largest coordinate in the grid, metres
     std::vector<CellBox> dirty_, occupancy_changes_;
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;

@@ -25,6 +25,7 @@ struct Reader {
     explicit Reader(const HostBricks& host) : bricks(host), cells(host.field().cells()) {}
 
     uint field_cell(ivec3 cell) const { return cells.at(cell.x, cell.y, cell.z); }
+    static void field_enter(uint, ivec3) {}
     int field_slot(ivec3 cell) const {
         const uint32_t word = bricks.field().cell_word(cell.x, cell.y, cell.z);
         return (word & kCellOccupied) != 0 ? int(word & kCellSlotMask) : -1;

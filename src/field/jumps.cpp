@@ -61,12 +61,12 @@ constexpr auto kSpread = [] {
 }();
 
 // Where a row of cells lies in its page.
-size_t row_of(int y, int z) { return size_t((z % kCellPage * kCellPage + y % kCellPage) * kCellPage); }
+size_t row_of(int y, int z) { return size_t(((z & (kCellPage - 1)) * kCellPage + (y & (kCellPage - 1))) * kCellPage); }
 
 // The pages that a box meets, and what each has of it.
 template <typename Fn>
 void each_page(const CellMap& cells, const CellBox& box, Fn&& fn) {
-    const auto first = [](int a) { return a / kCellPage; };
+    const auto first = [](int a) { return a >> 3; };  // kCellPage = 8; positions on a torus may be negative
     for (int z = first(box.min.z); z * kCellPage < box.max.z; ++z) {
         for (int y = first(box.min.y); y * kCellPage < box.max.y; ++y) {
             for (int x = first(box.min.x); x * kCellPage < box.max.x; ++x) {
@@ -112,7 +112,9 @@ CellBox joined(const CellBox& a, const CellBox& b) {
 
 void update_jumps(CellMap& cells, const CellBox& box) {
     if (box.empty()) return;
-    CellBox wide = grown(box, kMaxJump, cells.size());
+    CellBox wide = cells.wraps() ? CellBox{box.min - ivec3{kMaxJump, kMaxJump, kMaxJump},
+                                           box.max + ivec3{kMaxJump, kMaxJump, kMaxJump}}
+                                 : grown(box, kMaxJump, cells.size());
     wide.min.x &= ~(kCellPage - 1);
     const ivec3 size = wide.max - wide.min;
     BitBox occupied(size), near(size), next(size), between(size);

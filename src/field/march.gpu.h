@@ -4,6 +4,7 @@
 //     uint field_cell(ivec3 cell)                   cell word; `cell` counts from the grid's first cell and is inside
 //     Corners field_corners(int slot, ivec3 voxel)  stored values, in voxels, at the corners of voxel 0 … 6 of a brick
 //     bool field_voxel_solid(int slot, ivec3 voxel) may any of these be solid? (true, if one does not know)
+//     void field_enter(uint word, ivec3 texel)      the brick of this word, whose first texel this is, comes next
 // Which voxels are looked at never changes what one of them answers, so a march with and without jumps finds the same hit.
 // In C++ this text is included inside a struct; it opens no namespace and includes nothing. Needs brick.gpu.h and cubic.gpu.h.
 
@@ -126,7 +127,14 @@ KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t
         if ((word & kCellOccupied) != 0u) {
             ivec3 world = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
             ivec3 texel = ivec3(world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels);
+            if (word == kCellMissing) {
+                hit.state = kMarchMissing;
+                hit.t = t;
+                hit.cell = world;
+                return hit;
+            }
             int slot = int(word & kCellSlotMask);
+            field_enter(word, texel);
             if (march_brick(brick_ray(ray, texel), slot, t_min, t_max, hit)) {
                 hit.state = kMarchHit;
                 hit.slot = slot;

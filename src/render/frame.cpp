@@ -158,10 +158,10 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
-    if (!in.analytic) out.push_back(&kMarch);
+    if (!in.analytic) out.push_back(in.levels ? &kMarchLevels : &kMarch);
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
-    out.push_back(in.exact ? &specialised(kResolveExact, in.use) : &kResolve);
+    out.push_back(&resolve_kernel(in));
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;

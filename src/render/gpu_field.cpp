@@ -131,15 +131,22 @@ Result<void> GpuField::store_pages(Storage& storage, std::string_view name, cons
                                    const PagedArray<T, kPage>* old) {
     bool kept = false;
     if (auto r = reserve(storage, name, pages.size() * sizeof(T), kept); !r) return r;
+    return write_pages(storage, 0, pages, kept ? old : nullptr);
+}
+
+template <typename T, size_t kPage>
+Result<void> GpuField::write_pages(const Storage& storage, uint64_t offset, const PagedArray<T, kPage>& pages,
+                                   const PagedArray<T, kPage>* old) {
     std::vector<T> run;
     for (size_t page = 0, first = 0; page <= pages.pages(); ++page) {
-        const bool ends = page == pages.pages() || (kept && old != nullptr && pages.same_page(*old, page)) ||
+        const bool ends = page == pages.pages() || (old != nullptr && pages.same_page(*old, page)) ||
                           run.size() * sizeof(T) >= kCompareBlock;
         if (ends && !run.empty()) {
-            if (auto r = device_->write_buffer(storage.handle, first * kPage * sizeof(T), bytes_of(run)); !r) return r;
+            if (auto r = device_->write_buffer(storage.handle, offset + first * kPage * sizeof(T), bytes_of(run)); !r)
+                return r;
             run.clear();
         }
-        if (page == pages.pages() || (kept && old != nullptr && pages.same_page(*old, page))) continue;
+        if (page == pages.pages() || (old != nullptr && pages.same_page(*old, page))) continue;
         if (run.empty()) first = page;
         if (const auto* content = pages.find(page)) {
             run.insert(run.end(), content->begin(), content->end());
@@ -230,7 +237,7 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
 
 // The unbounded edits, as one program; nothing when none of them adds. (An intersect takes away what is far from it: unbounded.)
 std::vector<sdf::Instruction> GpuField::outside_code() {
-    const sdf::Program& program = field_->program();
+    const sdf::Program& program = this->program();
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
     bool adds = false;
     bool concave = true;
@@ -282,58 +289,20 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
 
     const std::shared_ptr<const field::Field> old = std::move(field_);
     field_ = next;
+    levels_.reset();
     auto fail = [this](Error error) -> Result<void> {
         field_.reset();  // what the buffers hold is not known any more
         return error;
     };
-    const std::span<const sdf::Instruction> tape = next->program().tape();
-    std::vector<sdf::Instruction> programs(tape.begin(), tape.end());
-    program_count_ = uint32_t(programs.size());
-    const std::vector<sdf::Instruction> outside = outside_code();
-    const bool software = device_->info().kind == rhi::DeviceKind::Cpu;
-    const TapeUse inside = tape_use(programs), leaves = tape_use(outside), none{0, 0, 0, 1};
-    use_ = both(software ? inside : any_kind(inside), use_known_ ? use_ : none);
-    // Half-spaces are few kinds whatever the world: a kernel of its own on every device.
-    outside_use_ = both(software || outside_is_concave_ ? leaves : any_kind(leaves), use_known_ ? outside_use_ : none);
-    use_known_ = true;
-    outside_count_ = uint32_t(outside.size());
-    programs.insert(programs.end(), outside.begin(), outside.end());
-
     if (auto r = store_pages(cells_, "cells", next->cells().words(), old ? &old->cells().words() : nullptr); !r)
         return fail(r.error());
     if (auto r = store_pages(records_, "records", next->records(), old ? &old->records() : nullptr); !r)
         return fail(r.error());
     if (auto r = store_grown(code_, "code", next->code(), old ? &old->code() : nullptr); !r) return fail(r.error());
-    if (auto r = store(program_, "program", bytes_of(programs), bytes_of(program_code_)); !r) return fail(r.error());
-    program_code_ = std::move(programs);
-    const auto& new_samples = next->program().samples;
-    const auto& new_params = next->program().params;
-    bool kept = false;
-    if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r)
+    if (auto r = store_programs(old ? &old->program().samples : nullptr, old ? &old->program().params : nullptr); !r)
         return fail(r.error());
-    kept = kept && old && old->program().samples.size() == new_samples.size();
-    const uint64_t params_at = new_samples.size() * sizeof(float);
-    if (auto r = write_grown(numbers_, 0, new_samples, kept ? &old->program().samples : nullptr); !r)
-        return fail(r.error());
-    if (auto r = write_grown(numbers_, params_at, new_params, kept ? &old->program().params : nullptr); !r)
-        return fail(r.error());
-    if (!dropped_) {
-        auto buffer = device_->create_buffer({.size = 16, .label = "dropped materials"});
-        if (!buffer) return fail(buffer.error());
-        dropped_ = *buffer;
-        const std::array<uint32_t, 4> zeros{};
-        if (auto r = device_->write_buffer(dropped_, 0, bytes_of(zeros)); !r) return fail(r.error());
-    }
     if (!same_atlas) {
-        // A growing world gets half as much again, where that fits.
-        const uint32_t wanted = next->slot_count();
-        const uint32_t roomy = distances_ ? wanted + wanted / 2 : wanted;
-        auto made = make_atlas(std::max(roomy, 1u), format, baker);
-        if (!made && roomy != wanted) made = make_atlas(std::max(wanted, 1u), format, baker);
-        if (!made) {
-            drop_atlas();
-            return fail(made.error());
-        }
+        if (auto r = fit_atlas(next->slot_count(), format, baker); !r) return fail(r.error());
     }
 
     std::vector<uint32_t> slots;
@@ -365,6 +334,129 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     bricks_baked_ = uint32_t(slots.size());
     bricks_on_host_ = uint32_t(for_host.size());
     return {};
+}
+
+// The whole program, what leaves the grid, and the numbers of both.
+Result<void> GpuField::store_programs(const AppendArray<float>* old_samples, const AppendArray<float>* old_params) {
+    const std::span<const sdf::Instruction> tape = program().tape();
+    std::vector<sdf::Instruction> programs(tape.begin(), tape.end());
+    program_count_ = uint32_t(programs.size());
+    const std::vector<sdf::Instruction> outside = outside_code();
+    const bool software = device_->info().kind == rhi::DeviceKind::Cpu;
+    const TapeUse inside = tape_use(programs), leaves = tape_use(outside), none{0, 0, 0, 1};
+    use_ = both(software ? inside : any_kind(inside), use_known_ ? use_ : none);
+    // Half-spaces are few kinds whatever the world: a kernel of its own on every device.
+    outside_use_ = both(software || outside_is_concave_ ? leaves : any_kind(leaves), use_known_ ? outside_use_ : none);
+    use_known_ = true;
+    outside_count_ = uint32_t(outside.size());
+    programs.insert(programs.end(), outside.begin(), outside.end());
+    if (auto r = store(program_, "program", bytes_of(programs), bytes_of(program_code_)); !r) return r;
+    program_code_ = std::move(programs);
+    const AppendArray<float>& new_samples = program().samples;
+    const AppendArray<float>& new_params = program().params;
+    bool kept = false;
+    if (auto r = reserve(numbers_, "numbers", (new_samples.size() + new_params.size()) * sizeof(float), kept); !r)
+        return r;
+    kept = kept && old_samples != nullptr && old_samples->size() == new_samples.size();
+    const uint64_t params_at = new_samples.size() * sizeof(float);
+    if (auto r = write_grown(numbers_, 0, new_samples, kept ? old_samples : nullptr); !r) return r;
+    if (auto r = write_grown(numbers_, params_at, new_params, kept ? old_params : nullptr); !r) return r;
+    if (!dropped_) {
+        auto buffer = device_->create_buffer({.size = 16, .label = "dropped materials"});
+        if (!buffer) return buffer.error();
+        dropped_ = *buffer;
+        const std::array<uint32_t, 4> zeros{};
+        if (auto r = device_->write_buffer(dropped_, 0, bytes_of(zeros)); !r) return r;
+    }
+    return {};
+}
+
+// A new atlas. A growing world gets half as much again, where that fits.
+Result<void> GpuField::fit_atlas(uint32_t slots, rhi::Format format, Baker baker) {
+    const uint32_t roomy = distances_ ? slots + slots / 2 : slots;
+    auto made = make_atlas(std::max(roomy, 1u), format, baker);
+    if (!made && roomy != slots) made = make_atlas(std::max(slots, 1u), format, baker);
+    if (!made) drop_atlas();
+    return made;
+}
+
+Result<void> GpuField::update(const field::Clipmap& next) {
+    bricks_baked_ = bricks_on_host_ = 0;
+    bake_ms_ = 0;
+    const auto start = std::chrono::steady_clock::now();
+    const rhi::Format format =
+        next.options().format == field::DistanceFormat::Half ? rhi::Format::R16Float : rhi::Format::R8Snorm;
+    std::optional<field::Clipmap> before = std::move(levels_);
+    field_.reset();
+    levels_ = next;
+    const auto fail = [this](Error error) -> Result<void> {
+        levels_.reset();
+        return error;
+    };
+    const bool same_atlas = distances_ && format == format_ && baker_ == Baker::Host &&
+                            next.slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
+    const field::Clipmap* const old = before && same_atlas && before->level_count() == next.level_count() &&
+                                              before->options().cells == next.options().cells &&
+                                              before->options().format == next.options().format
+                                          ? &*before
+                                          : nullptr;
+
+    const uint64_t level_bytes = next.cells(0).words().size() * sizeof(uint32_t);
+    bool kept = false;
+    if (auto r = reserve(cells_, "cells", level_bytes * uint64_t(next.level_count()), kept); !r) return fail(r.error());
+    for (int level = 0; level < next.level_count(); ++level) {
+        if (auto r = write_pages(cells_, level_bytes * uint64_t(level), next.cells(level).words(),
+                                 kept && old != nullptr ? &old->cells(level).words() : nullptr);
+            !r)
+            return fail(r.error());
+    }
+    if (auto r = store_pages(records_, "records", next.records(), old != nullptr ? &old->records() : nullptr); !r)
+        return fail(r.error());
+    if (auto r = store_grown(code_, "code", next.code(), old != nullptr ? &old->code() : nullptr); !r)
+        return fail(r.error());
+    if (old == nullptr || old->program() != next.program()) {
+        const sdf::Program* const was = old != nullptr ? old->program().get() : nullptr;
+        if (auto r = store_programs(was != nullptr ? &was->samples : nullptr, was != nullptr ? &was->params : nullptr);
+            !r)
+            return fail(r.error());
+    }
+    if (!same_atlas) {
+        if (auto r = fit_atlas(next.slot_count(), format, Baker::Host); !r) return fail(r.error());
+    }
+    std::vector<uint32_t> slots;
+    for (uint32_t slot = 0; slot < next.slot_count(); ++slot) {
+        const field::BrickContent& brick = next.content(slot);
+        if (!brick) continue;
+        if (old != nullptr && slot < old->slot_count()) {
+            const field::BrickContent& was = old->content(slot);
+            if (brick.half == was.half && brick.bytes == was.bytes && brick.materials == was.materials &&
+                brick.material == was.material)
+                continue;
+        }
+        slots.push_back(slot);
+    }
+    if (slots.empty()) return {};
+    if (auto r = store_texels(slots, next.options().workers, [&](uint32_t slot) { return next.content(slot); }); !r)
+        return fail(r.error());
+    bricks_baked_ = bricks_on_host_ = uint32_t(slots.size());
+    bake_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return {};
+}
+
+field::LevelsBlock GpuField::levels() const {
+    field::LevelsBlock out{};
+    out.params = levels_->params();
+    out.params.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
+    for (int level = 0; level < levels_->level_count(); ++level) {
+        const field::ivec3 first = levels_->first_cell(level);
+        out.places[level] = {first.x, first.y, first.z, 0};
+    }
+    return out;
+}
+
+BrickCode GpuField::code_of_bricks() const {
+    if (levels_) return {levels_->program().get(), &levels_->records(), levels_->code(), levels_->options().workers};
+    return {&field_->program(), &field_->records(), field_->code(), field_->options().workers};
 }
 
 Result<void> GpuField::bake(std::span<const uint32_t> slots) {
@@ -401,18 +493,28 @@ Result<void> GpuField::bake(std::span<const uint32_t> slots) {
 Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
     bricks_baked_ = uint32_t(slots.size());
     const auto start = std::chrono::steady_clock::now();
+    auto stored = store_texels(slots, field_->options().workers, [&](uint32_t slot) {
+        const field::BrickRecord& record = field_->records()[slot];
+        field::BrickEvaluator evaluator(field_->program(), field_->options().voxel_size);
+        evaluator.evaluate(field_->code_of(slot), {record.texel_x, record.texel_y, record.texel_z});
+        return evaluator.content(field_->options().format);
+    });
+    bake_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+    return stored;
+}
+
+// content(slot), from any thread, into the atlas.
+template <typename Content>
+Result<void> GpuField::store_texels(std::span<const uint32_t> slots, int workers, Content&& content) {
     const size_t code_bytes = rhi::bytes_per_texel(format_);
     for (size_t at = 0; at < slots.size(); at += kJobsPerSlice) {
         const auto slice = slots.subspan(at, std::min<size_t>(kJobsPerSlice, slots.size() - at));
         std::vector<std::byte> codes(packed_bytes(slice.size(), 8 * code_bytes));
         std::vector<std::byte> words(packed_bytes(slice.size(), 16));
         std::vector<uint32_t> tables(slice.size() * field::kBrickTableWords);
-        parallel_for(int(slice.size()), field_->options().workers, [&](int i) {
+        parallel_for(int(slice.size()), workers, [&](int i) {
             const size_t job = size_t(i);
-            const field::BrickRecord& record = field_->records()[slice[job]];
-            field::BrickEvaluator evaluator(field_->program(), field_->options().voxel_size);
-            evaluator.evaluate(field_->code_of(slice[job]), {record.texel_x, record.texel_y, record.texel_z});
-            const field::BrickContent brick = evaluator.content(field_->options().format);
+            const field::BrickContent brick = content(slice[job]);
             const auto* const from = brick.half ? reinterpret_cast<const std::byte*>(brick.half->data())
                                                 : reinterpret_cast<const std::byte*>(brick.bytes->data());
             for (size_t row = 0; row < 64; ++row) {
@@ -443,7 +545,6 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
         graph.output(f.materials, rhi::Access::SampledReadCompute);
         if (auto submit = runner_->execute(graph); !submit) return submit.error();
     }
-    bake_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
     return {};
 }
 
@@ -462,14 +563,24 @@ FieldHandles GpuField::import(Graph& graph) const {
 }
 
 field::GridParams GpuField::grid() const {
-    field::GridParams g = field_->grid();
+    field::GridParams g;
+    if (levels_) {
+        // A finest cell less than the last level's box, so that what leaves it is looked at before levels end.
+        const field::LevelsParams p = levels_->params();
+        const int reach = int(field::level_reach(p.cells)) << (p.count - 1);
+        const auto first = [&](int focus) { return field::cell_of_texel(focus - reach) + 2; };
+        const int size = 2 * reach / field::kBrickVoxels - 3;
+        g = {first(p.focus_x), first(p.focus_y), first(p.focus_z), p.voxel_size, size, size, size, 0};
+    } else {
+        g = field_->grid();
+    }
     g.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
     return g;
 }
 
 float GpuField::distance_scale() const { return format_ == rhi::Format::R8Snorm ? field::kBandVoxels : 1.0f; }
 
-uint32_t GpuField::params_first() const { return uint32_t(field_->program().samples.size()); }
+uint32_t GpuField::params_first() const { return uint32_t(program().samples.size()); }
 
 uint32_t GpuField::outside_first() const { return program_count_; }
 

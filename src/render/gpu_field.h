@@ -3,12 +3,14 @@
 // Kept between frames: a field whose parent is the one already here costs only what changed. Owner's thread.
 #pragma once
 
+#include "field/clipmap.h"
 #include "field/field.h"
 #include "render/graph.h"
 #include "render/passes/tape_use.h"
 #include "rhi/device.h"
 
 #include <memory>
+#include <optional>
 
 namespace kiln::render {
 
@@ -17,6 +19,14 @@ struct FieldHandles {
     Buffer cells, records, code, program, tables, dropped;
     Buffer numbers;  // Program::samples, then Program::params
     Image distances, materials;
+};
+
+// Where the code of bricks is, on the host.
+struct BrickCode {
+    const sdf::Program* program;
+    const field::Field::Records* records;
+    std::span<const sdf::Instruction> code;
+    int workers;
 };
 
 // Who bakes, and how the distances get into the atlas.
@@ -37,10 +47,17 @@ public:
     // Makes the GPU's copy that of `field`. OutOfMemory, with the number of bytes, when the atlas does not fit.
     Result<void> update(std::shared_ptr<const field::Field> field, Baker baker = Baker::Auto);
 
+    // Makes the GPU's copy that of `levels` as it is now, whose bricks are made already: what changed since the last call is written.
+    Result<void> update(const field::Clipmap& levels);
+
     FieldHandles import(Graph& graph) const;
 
+    bool has_levels() const { return levels_.has_value(); }
+    field::LevelsBlock levels() const;  // with the atlas layout filled in
+    BrickCode code_of_bricks() const;
+    const sdf::Program& program() const { return levels_ ? *levels_->program() : field_->program(); }
     const field::Field* field() const { return field_.get(); }
-    field::GridParams grid() const;  // with the atlas layout filled in
+    field::GridParams grid() const;  // with the atlas layout filled in; of levels: the box they fill, in finest cells
     float distance_scale() const;    // voxels a unit of the atlas
     bool leaves_grid() const { return outside_count_ != 0; }
     // Nothing but half-spaces, in unions, leaves the grid: along any ray the field there is a concave function.
@@ -82,6 +99,9 @@ private:
     template <typename T, size_t kPage>
     Result<void> store_pages(Storage& storage, std::string_view name, const PagedArray<T, kPage>& pages,
                              const PagedArray<T, kPage>* old);
+    template <typename T, size_t kPage>
+    Result<void> write_pages(const Storage& storage, uint64_t offset, const PagedArray<T, kPage>& pages,
+                             const PagedArray<T, kPage>* old);
     template <typename T>
     Result<void> write_grown(const Storage& storage, uint64_t offset, const AppendArray<T>& array,
                              const AppendArray<T>* old);
@@ -92,11 +112,16 @@ private:
     void drop_atlas();
     Result<void> bake(std::span<const uint32_t> slots);
     Result<void> bake_on_host(std::span<const uint32_t> slots);
+    template <typename Content>
+    Result<void> store_texels(std::span<const uint32_t> slots, int workers, Content&& content);
+    Result<void> store_programs(const AppendArray<float>* old_samples, const AppendArray<float>* old_params);
+    Result<void> fit_atlas(uint32_t slots, rhi::Format format, Baker baker);
     std::vector<sdf::Instruction> outside_code();
 
     Runner* runner_;
     rhi::Device* device_;
     std::shared_ptr<const field::Field> field_;
+    std::optional<field::Clipmap> levels_;  // what the buffers hold instead of a field
     Storage cells_, records_, code_, program_, numbers_;
     std::vector<sdf::Instruction> program_code_;
     rhi::BufferHandle tables_, dropped_;

@@ -34,8 +34,8 @@ struct Filter {
     vec3 bloom_sample(vec2 at) const {
         const float x = at.x - 0.5f, y = at.y - 0.5f, x_0 = std::floor(x), y_0 = std::floor(y);
         const int i = int(x_0), j = int(y_0);
-        return mix(mix(from.at(i, j), from.at(i + 1, j), x - x_0), mix(from.at(i, j + 1), from.at(i + 1, j + 1), x - x_0),
-                   y - y_0);
+        return mix(mix(from.at(i, j), from.at(i + 1, j), x - x_0),
+                   mix(from.at(i, j + 1), from.at(i + 1, j + 1), x - x_0), y - y_0);
     }
 #include "render/lib/bloom.gpu.h"
 };
@@ -49,7 +49,8 @@ void fill(Light& out, int workers, Texel&& texel) {
 
 // Where the middle of a texel of `to` is in texels of `from`.
 vec2 middle(const Light& from, const Light& to, int x, int y) {
-    return {(float(x) + 0.5f) * float(from.width) / float(to.width), (float(y) + 0.5f) * float(from.height) / float(to.height)};
+    return {(float(x) + 0.5f) * float(from.width) / float(to.width),
+            (float(y) + 0.5f) * float(from.height) / float(to.height)};
 }
 
 // The glow at full size.
@@ -82,7 +83,8 @@ Light blurred(const Light& picture, float multiplier, float threshold, int worke
         if (!(shade::luminance(c) * multiplier >= threshold)) c = {};
     std::array<float, 2 * kBlurReach + 1> weights;
     float sum = 0;
-    for (int i = -kBlurReach; i <= kBlurReach; ++i) sum += weights[size_t(i + kBlurReach)] = std::exp(-0.125f * float(i * i));
+    for (int i = -kBlurReach; i <= kBlurReach; ++i)
+        sum += weights[size_t(i + kBlurReach)] = std::exp(-0.125f * float(i * i));
     for (int pass = 0; pass < kBlurPasses; ++pass) {
         Light next(now.width, now.height);
         fill(next, workers, [&](int x, int y) {
@@ -140,9 +142,8 @@ std::vector<vec3> glow_of(const Picture& picture, const Camera& camera, float mu
         const float* const p = picture.rgba.data() + (size_t(y) * size_t(picture.width) + size_t(x)) * 4;
         return vec3{p[0], p[1], p[2]};
     });
-    return camera.bloom_kind == BloomKind::Gaussian
-               ? blurred(light, multiplier, camera.bloom_threshold, workers).texels
-               : pyramid(light, camera.bloom_size, workers).texels;
+    return camera.bloom_kind == BloomKind::Gaussian ? blurred(light, multiplier, camera.bloom_threshold, workers).texels
+                                                    : pyramid(light, camera.bloom_size, workers).texels;
 }
 
 void develop(Picture& picture, const Camera& camera, const shade::ExposureState& exposure, int workers) {

@@ -79,6 +79,7 @@ struct Renderer::Impl {
         TileInputs in;
         in.image_sky = frame.environment && frame.environment_map;
         in.analytic = settings.analytic;
+        in.levels = field->has_levels();
         in.exact = settings.analytic || field->leaves_grid();
         in.horizons = !settings.analytic && field->outside_is_concave();
         in.refine = settings.refine && !settings.analytic && !refines_on_host();
@@ -153,6 +154,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         TileInputs in = inputs(frame, settings);
         in.field = field->import(g);
         in.frame = g.block(params);
+        if (in.levels) in.levels_block = g.block(field->levels());
         const FrameRay no_ray{};
         in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
         const std::vector<MaterialRecord> materials = material_records(frame);
@@ -195,7 +197,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         if (!words) return words.error();
         visibility = std::move(*words);
         const auto start = std::chrono::steady_clock::now();
-        refined = refine_on_host(*field->field(), params, visibility);
+        refined = refine_on_host(field->code_of_bricks(), params, visibility);
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         add_times({.passes = {{.name = "refine", .ms = ms}}, .total_ms = ms});
     }
@@ -224,13 +226,19 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
 }
 
 Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings& settings) {
-    KILN_ASSERT(frame.field != nullptr, "a Frame without a field; World::frame() makes one");
+    KILN_ASSERT(frame.field != nullptr || frame.levels != nullptr, "a Frame without a field; World::frame() makes one");
+    const bool levels = frame.levels != nullptr;
+    const sdf::Program& program = levels ? *frame.levels->program() : frame.field->program();
     fault.clear();
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
+    if (settings.analytic && levels)
+        return Error{
+            "analytic: a world of several levels is drawn from bricks; set field.levels to 1 to march its edits",
+            ErrorKind::Usage};
     if (settings.analytic) {
-        const std::span<const sdf::Instruction> code = frame.field->program().tape();
+        const std::span<const sdf::Instruction> code = program.tape();
         if (std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); }))
             return Error{
                 "analytic: the GPU cannot run this world's program (a shape of the program's own, or a formula with "
@@ -238,7 +246,9 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                 "it has registers); draw it from bricks",
                 ErrorKind::Usage};
     }
-    if (auto updated = field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto); !updated)
+    if (auto updated = levels ? field->update(*frame.levels)
+                              : field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto);
+        !updated)
         return updated.error();
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
         return warm.error();
@@ -281,8 +291,13 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         add_times({.passes = {{.name = "develop", .ms = ms}}, .total_ms = ms});
     }
     stats.exposure = eye.multiplier;
-    stats.bricks = int(frame.field->stats().bricks);
-    stats.edits = int(frame.field->program().index.size());
+    stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
+    stats.edits = int(program.index.size());
+    for (int level = 0; levels && level < frame.levels->level_count(); ++level) {
+        const field::LevelCounts& c = frame.levels->counts(level);
+        stats.levels.push_back({double(frame.levels->voxel_size(level)), c.bricks, c.missing_cells, c.refused_cells,
+                                c.baked, c.evicted, c.entered_cells, c.skipped});
+    }
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;

@@ -3,6 +3,7 @@
 
 #include "scene/exact.h"
 
+#include "field/clipmap.h"
 #include "field/field.h"
 #include "render/lens.h"
 #include "render/lib/pack.h"
@@ -38,7 +39,7 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     if (settings.view != View::Shaded)
         return Error{"the reference draws the shaded view only; leave --view out", ErrorKind::Usage};
     const auto start = std::chrono::steady_clock::now();
-    const sdf::Program& program = frame.field->program();
+    const sdf::Program& program = frame.levels ? *frame.levels->program() : frame.field->program();
     const scene::ExactField exact(program);
     render::ReferenceField field;
     field.distance = [&](dvec3 p) { return exact.distance(p); };
@@ -72,7 +73,7 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
         *stats = {};
         stats->device = "CPU path tracer, exact edits";
         stats->edits = int(program.index.size());
-        stats->bricks = int(frame.field->stats().bricks);
+        stats->bricks = frame.levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
         stats->frame_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         stats->passes = {{"reference", stats->frame_ms}};
         stats->coarsened = frame.coarsened;

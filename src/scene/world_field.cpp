@@ -49,6 +49,7 @@ void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     const std::lock_guard lock(mutex);
     program.reset();
     changes.push_back({removed, inserted});
+    level_changes.push_back({removed, inserted});
     asked.reset();
 }
 
@@ -96,6 +97,8 @@ Result<void> World::Impl::compile_all() {
     program.reset();
     built = {};
     changes.clear();
+    levels.reset();
+    level_changes.clear();
     return {};
 }
 
@@ -180,12 +183,64 @@ std::shared_ptr<const WorldView::Impl> World::Impl::view() {
 
 Box3 World::bounds() const { return impl_->compiled()->bounds; }
 
-Result<Frame> World::frame(std::string_view camera) const {
-    auto built = impl_->field(field_settings);
-    if (!built) return built.error();
+Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 focus, const FieldSettings& settings,
+                                                                         const FrameBudget& budget) {
+    const std::shared_ptr<const sdf::Program> now = compiled();
+    const std::lock_guard lock(mutex);
+    const dvec3 at{double(focus.x), double(focus.y), double(focus.z)};
+    if (levels && same(settings, levels_with)) {
+        if (!level_changes.empty()) levels->edit(now, level_changes);
+        levels->move(at);
+    } else {
+        if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
+            return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
+        auto made = field::Clipmap::make(
+            now,
+            {.voxel_size = resolution(*now, settings).voxel_size,
+             .levels = settings.levels,
+             .cells = settings.cells,
+             .format = settings.distance_8bit ? field::DistanceFormat::Snorm8 : field::DistanceFormat::Half},
+            at);
+        if (!made) return made.error();
+        levels = std::move(*made);
+        levels_with = settings;
+    }
+    level_changes.clear();
+    levels->work({.bricks = budget.bricks,
+                  .seconds = budget.seconds < 1e9 ? budget.seconds : std::numeric_limits<double>::infinity()});
+    return std::make_shared<const field::Clipmap>(*levels);
+}
+
+Result<Camera> World::camera(std::string_view name) const {
+    if (name.empty())
+        return cameras.empty() ? scene::framing_camera(impl_->compiled()->bounds) : cameras.front().second;
+    std::vector<std::string_view> names;
+    for (const auto& [known, value] : cameras) {
+        if (known == name) return value;
+        names.push_back(known);
+    }
+    return Error{formatted("there is no camera \"{}\"; {}", name, scene::suggestion(name, names)), ErrorKind::Usage};
+}
+
+Result<Frame> World::frame(std::string_view name) const {
+    auto seen_from = camera(name);
+    if (!seen_from) return seen_from.error();
+    return frame(*seen_from);
+}
+
+Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) const {
     Frame out;
-    out.field = built->field;
-    out.coarsened = built->coarsened;
+    out.camera = camera;
+    if (field_settings.levels > 1) {
+        auto levels = impl_->levels_around(camera.position, field_settings, budget);
+        if (!levels) return levels.error();
+        out.levels = std::move(*levels);
+    } else {
+        auto built = impl_->field(field_settings);
+        if (!built) return built.error();
+        out.field = built->field;
+        out.coarsened = built->coarsened;
+    }
     out.materials.reserve(impl_->data.materials.size() + 1);
     out.materials.emplace_back();  // sdf::kDefaultMaterial
     for (const auto& [name, material] : impl_->data.materials) out.materials.push_back(material);
@@ -205,20 +260,7 @@ Result<Frame> World::frame(std::string_view camera) const {
     }
     // An image of a sky has its own sun.
     if (out.lights.empty() && !image) out.lights.push_back(render::shade::default_sun());
-    if (camera.empty()) {
-        out.camera = cameras.empty() ? scene::framing_camera(built->field->program().bounds) : cameras.front().second;
-        return out;
-    }
-    std::vector<std::string_view> names;
-    for (const auto& [name, value] : cameras) {
-        if (name == camera) {
-            out.camera = value;
-            return out;
-        }
-        names.push_back(name);
-    }
-    return Error{formatted("there is no camera \"{}\"; {}", camera, scene::suggestion(camera, names)),
-                 ErrorKind::Usage};
+    return out;
 }
 
 std::string World::inspect_json() const {
@@ -271,7 +313,14 @@ std::string World::inspect_json() const {
                           {"divisor", r.divisor}});
     }
     if (!meshes.empty()) out["meshes"] = meshes;
-    if (auto built = impl_->field(field_settings)) {
+    if (field_settings.levels > 1) {
+        const float voxel = impl_->resolution(*program, field_settings).voxel_size;
+        out["voxel_size"] = voxel;
+        out["levels"] = field_settings.levels;
+        out["cells"] = field_settings.cells;
+        out["reach"] =
+            double(voxel) * std::ldexp(double(field::level_reach(field_settings.cells)), field_settings.levels - 1);
+    } else if (auto built = impl_->field(field_settings)) {
         const field::Field& f = *built->field;
         const field::GridParams grid = f.grid();
         const uint32_t bricks = f.stats().bricks;

@@ -8,6 +8,7 @@
 #include "scene/sky_image.h"
 
 #include "base/paged_array.h"
+#include "field/clipmap.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "render/lib/environment_map.h"
@@ -88,6 +89,9 @@ struct World::Impl {
     FieldSettings built_with;
     std::vector<field::RowChange> changes;            ///< since `built`
     std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
+    std::optional<field::Clipmap> levels;             ///< of a world of several, where it was last looked at from
+    FieldSettings levels_with;
+    std::vector<field::RowChange> level_changes;  ///< since `levels`
     scene::Grids grids;
 
     /// The image of the environment: read when its name is first met, brought into shape when it is first drawn.
@@ -104,6 +108,9 @@ struct World::Impl {
     std::shared_ptr<const sdf::Program> compiled();
     std::shared_ptr<const WorldView::Impl> view();
     Result<Built> field(const FieldSettings& settings);
+    /// The levels around a place, after one frame's baking.
+    Result<std::shared_ptr<const field::Clipmap>> levels_around(vec3 focus, const FieldSettings& settings,
+                                                                const FrameBudget& budget);
     /// Trilinear in bricks, exact elsewhere; false when there is no field.
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);
 };

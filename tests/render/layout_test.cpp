@@ -59,14 +59,30 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
     EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, view) + 4);
-    for (const Kernel* kernel :
-         {&kMarch, &kMarchExact, &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kView}) {
+    for (const Kernel* kernel : {&kMarch, &kMarchLevels, &kMarchExact, &kRefine, &kResolve, &kResolveExact,
+                                 &kResolveLevels, &kShadow, &kShadowExact, &kShadowLevels, &kLight, &kView}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, 0);
         ASSERT_TRUE(b) << kernel->name;
         ASSERT_EQ(b->kind, rhi::BindingKind::UniformBuffer) << kernel->name;
         EXPECT_EQ(b->block_size, sizeof(FrameParams)) << kernel->name;
         EXPECT_EQ(offsets(b->members), expected) << kernel->name;
+    }
+}
+
+TEST(Layout, LevelsAreTheSame) {
+    std::vector<uint32_t> words;
+    for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
+    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 6u}, {&kResolveLevels, 13u}, {&kShadowLevels, 9u}}) {
+        const rhi::Reflection r = reflected(*kernel);
+        const rhi::ReflectedBinding* b = binding(r, number);
+        ASSERT_TRUE(b) << kernel->name;
+        ASSERT_EQ(b->kind, rhi::BindingKind::UniformBuffer) << kernel->name;
+        EXPECT_EQ(b->block_size, sizeof(field::LevelsBlock)) << kernel->name;
+        ASSERT_EQ(b->members.size(), 2u);
+        EXPECT_EQ(offsets(b->members[0].members), words);
+        EXPECT_EQ(b->members[1].offset, sizeof(field::LevelsParams));
+        EXPECT_EQ(b->members[1].array_stride, sizeof(field::LevelPlace));
     }
 }
 

@@ -44,12 +44,14 @@ TEST(Lens, GlowIsRound) {
         const int i = int(std::floor(x - 0.5)), j = int(std::floor(y - 0.5));
         const double s = x - 0.5 - i, t = y - 0.5 - j;
         const auto texel = [&](int u, int v) { return double(glow[size_t(v) * 256 + size_t(u)].y); };
-        return (texel(i, j) * (1 - s) + texel(i + 1, j) * s) * (1 - t) + (texel(i, j + 1) * (1 - s) + texel(i + 1, j + 1) * s) * t;
+        return (texel(i, j) * (1 - s) + texel(i + 1, j) * s) * (1 - t) +
+               (texel(i, j + 1) * (1 - s) + texel(i + 1, j + 1) * s) * t;
     };
     for (const double r : {6.0, 10.0, 16.0, 24.0}) {
         double least = 1e30, most = 0;
         for (int i = 0; i < 64; ++i) {
-            const double turn = i * std::numbers::pi / 32, value = at(128 + r * std::cos(turn), 128 + r * std::sin(turn));
+            const double turn = i * std::numbers::pi / 32,
+                         value = at(128 + r * std::cos(turn), 128 + r * std::sin(turn));
             least = std::min(least, value);
             most = std::max(most, value);
         }
@@ -147,10 +149,11 @@ TEST_F(LensGpu, KernelsDevelopAsTheHostDoes) {
     frame.materials[1].emissive = {30, 10, 2};
     frame.environment->intensity = 0.01f;  // luminances of all sizes
     frame.lights = {{.kind = Light::Kind::Point, .position = {0.6f, 0.4f, 0.9f}, .intensity = 4}};
-    const Camera cameras[] = {{.tone_map = ToneMap::Agx},
-                              {.tone_map = ToneMap::Aces, .bloom = 0.2f},
-                              {.tone_map = ToneMap::Neutral, .auto_exposure = true, .bloom = 0.5f, .bloom_size = 0.3f},
-                              {.exposure = 0.5f, .bloom = 0.3f, .bloom_threshold = 1.5f, .bloom_kind = BloomKind::Gaussian}};
+    const Camera cameras[] = {
+        {.tone_map = ToneMap::Agx},
+        {.tone_map = ToneMap::Aces, .bloom = 0.2f},
+        {.tone_map = ToneMap::Neutral, .auto_exposure = true, .bloom = 0.5f, .bloom_size = 0.3f},
+        {.exposure = 0.5f, .bloom = 0.3f, .bloom_threshold = 1.5f, .bloom_kind = BloomKind::Gaussian}};
     for (const Camera& lens : cameras) {
         const Camera place = frame.camera;
         frame.camera = lens;

@@ -29,7 +29,7 @@ struct RefineGpu : GpuTest {
         const Readback kernel = g.readback(refine(g, in, seen.words));
         rhi::must(runner_->execute(g));
         Words out{rhi::must(words.get_as<uint32_t>()), rhi::must(kernel.get_as<uint32_t>()), {}};
-        out.by_host = refine_on_host(*gpu.field(), p, out.seen);
+        out.by_host = refine_on_host(gpu.code_of_bricks(), p, out.seen);
         return out;
     }
 };

@@ -19,7 +19,7 @@ using uint = uint32_t;
 KILN_CONST int kTileGroup = 8;  // a workgroup of the picture's kernels is 8 x 8 pixels
 
 struct FrameParams {
-    GridParams grid;
+    GridParams grid;                           // of a clipmap: the box that its levels fill, in finest cells
     int eye_x, eye_y, eye_z;                   // the camera: voxel it is in
     float distance_scale;                      // voxels a unit of the atlas
     float eye_part_x, eye_part_y, eye_part_z;  // and where in it, [0, 1)
@@ -63,8 +63,9 @@ struct MaterialRecord {
     float metallic;
 };
 
-// Visibility of a pixel, four words: t in voxels along the ray (bits of a float); state << 28 | slot;
-// voxel x | y << 3 | z << 6; steps | evaluations << 16 (each at most 65535).
+// Visibility of a pixel, four words: t in (finest) voxels along the ray (bits of a float); state << 28 | slot;
+// voxel x | y << 3 | z << 6 | level << 12; steps | evaluations << 16 (each at most 65535).
+KILN_CONST uint kSeenLevelShift = 12u;
 KILN_CONST uint kSeenNothing = 0u;
 KILN_CONST uint kSeenBrick = 1u;    // the trilinear surface in a brick
 KILN_CONST uint kSeenInside = 2u;   // solid without a brick: the camera is in it

@@ -3,10 +3,12 @@
 
 #include "shaders/march.spv.h"
 #include "shaders/march_exact.spv.h"
+#include "shaders/march_levels.spv.h"
 
 namespace kiln::render {
 
 const Kernel kMarch{"march", kMarchSpv};
+const Kernel kMarchLevels{"march levels", kMarchLevelsSpv};
 const Kernel kMarchExact{"march exact", kMarchExactSpv};
 
 Visibility march(Graph& g, const TileInputs& in) {
@@ -19,9 +21,10 @@ Visibility march(Graph& g, const TileInputs& in) {
         g.clear(words);
     } else {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
-        g.dispatch(kMarch, in.size,
-                   {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words),
-                    g.read(f.tables), g.write(counted)});
+        std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays), g.read(f.distances),
+                              g.write(words),      g.read(f.tables), g.write(counted)};
+        if (in.levels) uses.push_back(g.uniform(in.levels_block));
+        g.dispatch(in.levels ? kMarchLevels : kMarch, in.size, uses);
         out.evaluations.push_back(counted);
     }
     if (in.exact) {

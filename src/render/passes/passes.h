@@ -16,8 +16,9 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchExact, kRefine, kResolve, kResolveExact, kShadow, kShadowExact, kShadowHorizons,
-    kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
+    kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
+    kShadowLevelsHorizons, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -36,10 +37,11 @@ const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
 // What every pass of one tile reads.
 struct TileInputs {
     FieldHandles field;
-    Block frame;       // FrameParams
-    Buffer rays;       // FrameRay a pixel; a dummy unless kFrameRays
-    Buffer materials;  // MaterialRecord
-    Buffer lights;     // LightRecord
+    Block frame;         // FrameParams
+    Block levels_block;  // LevelsBlock; of a clipmap
+    Buffer rays;         // FrameRay a pixel; a dummy unless kFrameRays
+    Buffer materials;    // MaterialRecord
+    Buffer lights;       // LightRecord
     Buffer ggx_table;
     Buffer environment;  // EnvironmentMap::words; a dummy unless image_sky
     uint32_t light_count = 0;
@@ -48,6 +50,7 @@ struct TileInputs {
     bool analytic = false;  // … instead of the bricks
     bool horizons = false;  // exact code is half-spaces outside the grid, no more
     bool image_sky = false;
+    bool levels = false;  // the field is a clipmap
     bool refine = false;  // by the device: the host may do it
     // A shaded tile becomes what a screen shows here; else by develop() of lens.h, when the picture is whole.
     bool develops = true;
@@ -76,9 +79,10 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const I
 // What the bricks' code says of the points that march found in them; see refine.comp.
 Image refine(Graph& g, const TileInputs& in, const Image& visibility);
 // The same words from the same visibility words, made here: software devices run the tape many times slower.
-std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParams& frame,
+std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams& frame,
                                      std::span<const uint32_t> visibility);
 
+const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
 // Visible fractions of the discs of lights push.first_light … + 3, a channel each.
 Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);

@@ -30,10 +30,15 @@ void main() {
     uvec4 words = uvec4(kNotRefined, 0u, 0u, 0u);
     if ((seen.y >> 28u) == kSeenBrick) {
         BrickRecord record = records[seen.y & 0x0fffffffu];
+        if (record.far != 0u) {
+            imageStore(refined, pixel, words);
+            return;
+        }
         TexelRay ray = pixel_ray(pixel);
-        float h = frame.grid.voxel_size;
-        vec3 origin = (vec3(ray.whole) + ray.part) * h;
-        float t_first = uintBitsToFloat(seen.x);
+        float scale = float(1u << record.level);
+        vec3 origin = (vec3(ray.whole) + ray.part) * frame.grid.voxel_size;
+        float h = frame.grid.voxel_size * scale;  // from here on t counts voxels of the brick's level
+        float t_first = uintBitsToFloat(seen.x) / scale;
         float t = t_first;
         float t_before = t;
         float d_before = 0.0;
@@ -67,7 +72,7 @@ void main() {
         }
         float steep = length(gradient);
         if (steep > 0.0) {
-            words = uvec4(floatBitsToUint(t), pack_unit(gradient / steep), uint(mixed.id0) | (uint(mixed.id1) << 16u), floatBitsToUint(mixed.share));
+            words = uvec4(floatBitsToUint(t * scale), pack_unit(gradient / steep), uint(mixed.id0) | (uint(mixed.id1) << 16u), floatBitsToUint(mixed.share));
         }
     }
     imageStore(refined, pixel, words);

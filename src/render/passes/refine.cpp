@@ -39,7 +39,7 @@ struct Batch {
 
 }  // namespace
 
-std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParams& frame,
+std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams& frame,
                                      std::span<const uint32_t> visibility) {
     const size_t pixels = visibility.size() / 4;
     std::vector<uint32_t> out(visibility.size());
@@ -54,21 +54,26 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
         if (i == 0 || slot_of(asked[i]) != slot_of(asked[i - 1]) || i - firsts.back() == kMostAtOnce)
             firsts.push_back(i);
 
-    const float h = frame.grid.voxel_size;
-    const vec3 origin{(float(frame.eye_x) + frame.eye_part_x) * h, (float(frame.eye_y) + frame.eye_part_y) * h,
-                      (float(frame.eye_z) + frame.eye_part_z) * h};
-    parallel_for(int(firsts.size()), field.options().workers, [&](int group) {
+    const float finest = frame.grid.voxel_size;
+    const vec3 origin{(float(frame.eye_x) + frame.eye_part_x) * finest,
+                      (float(frame.eye_y) + frame.eye_part_y) * finest,
+                      (float(frame.eye_z) + frame.eye_part_z) * finest};
+    parallel_for(int(firsts.size()), bricks.workers, [&](int group) {
         thread_local Batch b;
         const size_t first = firsts[size_t(group)];
         const size_t last = size_t(group) + 1 < firsts.size() ? firsts[size_t(group) + 1] : asked.size();
         const std::span<const uint32_t> here(asked.data() + first, last - first);
-        const sdf::TapeView tape = sdf::view(field.program(), field.code_of(slot_of(here[0])));
+        const field::BrickRecord& record = (*bricks.records)[slot_of(here[0])];
+        if (record.far != 0) return;
+        const sdf::TapeView tape =
+            sdf::view(*bricks.program, bricks.code.subspan(record.code_first, record.code_count));
+        const float scale = float(1u << record.level), h = finest * scale;  // t counts voxels of the brick's level
         const sdf::Points points{b.x.data(), b.y.data(), b.z.data(), int(here.size())};
         for (size_t k = 0; k < here.size(); ++k) {
             const int x = int(here[k]) % frame.tile_width + frame.tile_x,
                       y = int(here[k]) / frame.tile_width + frame.tile_y;
             b.direction[k] = shade::camera_direction_at(frame.camera, float(x) + 0.5f, float(y) + 0.5f);
-            b.t_first[k] = b.t[k] = b.t_before[k] = std::bit_cast<float>(visibility[4 * size_t{here[k]}]);
+            b.t_first[k] = b.t[k] = b.t_before[k] = std::bit_cast<float>(visibility[4 * size_t{here[k]}]) / scale;
             b.d_before[k] = 0;
             const vec3 at = origin + b.direction[k] * (b.t[k] * h);
             b.size[k] = gpu::largest3({std::fabs(at.x), std::fabs(at.y), std::fabs(at.z)});
@@ -112,7 +117,7 @@ std::vector<uint32_t> refine_on_host(const field::Field& field, const FrameParam
             const float steep = length(b.gradient[k]);
             if (!b.holds[k] || !(steep > 0)) continue;
             uint32_t* const words = out.data() + 4 * size_t{here[k]};
-            words[0] = std::bit_cast<uint32_t>(b.t[k]);
+            words[0] = std::bit_cast<uint32_t>(b.t[k] * scale);
             words[1] = shade::pack_unit(b.gradient[k] * (1 / steep));
             words[2] = uint32_t(b.mixes[k].id0) | uint32_t(b.mixes[k].id1) << 16;
             words[3] = std::bit_cast<uint32_t>(b.mixes[k].weight);

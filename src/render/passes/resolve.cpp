@@ -3,11 +3,20 @@
 
 #include "shaders/resolve.spv.h"
 #include "shaders/resolve_exact.spv.h"
+#include "shaders/resolve_levels.spv.h"
+#include "shaders/resolve_levels_exact.spv.h"
 
 namespace kiln::render {
 
 const Kernel kResolve{"resolve", kResolveSpv};
 const Kernel kResolveExact{"resolve exact", kResolveExactSpv};
+const Kernel kResolveLevels{"resolve levels", kResolveLevelsSpv};
+const Kernel kResolveLevelsExact{"resolve levels exact", kResolveLevelsExactSpv};
+
+const Kernel& resolve_kernel(const TileInputs& in) {
+    if (!in.exact) return in.levels ? kResolveLevels : kResolve;
+    return specialised(in.levels ? kResolveLevelsExact : kResolveExact, in.use);
+}
 
 Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
     Surface out;
@@ -22,7 +31,8 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const I
     if (in.exact) {
         uses.insert(uses.end(), {g.read(f.code), g.read(f.program), g.read(f.numbers)});
     }
-    g.dispatch(in.exact ? specialised(kResolveExact, in.use) : kResolve, in.size, uses);
+    if (in.levels) uses.push_back(g.uniform(in.levels_block));
+    g.dispatch(resolve_kernel(in), in.size, uses);
     return out;
 }
 

@@ -22,6 +22,15 @@ layout(set = 0, binding = 14, std430) readonly buffer ProgramCode { uvec2 progra
 layout(set = 0, binding = 15, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 
+#ifdef KILN_LEVELS
+#ifdef KILN_EXACT
+const uint kLevelsBinding = 16u;
+#else
+const uint kLevelsBinding = 13u;
+#endif
+layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
+#endif
+
 #include "render/passes/refine.gpu.h"
 #define KILN_FIELD_SURFACE
 #include "render/passes/field.glsl"
@@ -77,9 +86,17 @@ void main() {
         BrickRecord record = records[slot];
         ivec3 texel = ivec3(record.texel_x, record.texel_y, record.texel_z);
         ivec3 voxel = ivec3(seen.z & 7u, (seen.z >> 3u) & 7u, (seen.z >> 6u) & 7u);
+#ifdef KILN_LEVELS
+        int level = int(record.level);
+        here_level = level;
+        BrickRay local = brick_ray(level_ray(ray, level), texel);
+        vec3 p = voxel_point(local, voxel, t / float(1 << level) - local.t_base);
+        s.normal = unit_or(level_gradient(level, texel / kBrickVoxels, vec3(voxel) + p), -ray.direction);
+#else
         BrickRay local = brick_ray(ray, texel);
         vec3 p = voxel_point(local, voxel, t - local.t_base);
         s.normal = unit_or(dual_gradient(slot, texel / kBrickVoxels, vec3(voxel) + p), -ray.direction);
+#endif
         SurfaceMaterial mixed = surface_material(slot, voxel, p);
         add_material(s, tables[slot * kBrickTableWords + int(mixed.slot0)], 1.0 - mixed.share);
         if (mixed.share > 0.0) add_material(s, tables[slot * kBrickTableWords + int(mixed.slot1)], mixed.share);

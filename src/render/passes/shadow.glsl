@@ -21,10 +21,21 @@ layout(set = 0, binding = 10, std430) readonly buffer Code { uvec2 code[]; };
 layout(set = 0, binding = 11, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
 layout(set = 0, binding = 12, std430) readonly buffer Numbers { float numbers[]; };
 #endif
+#ifdef KILN_LEVELS
+#ifdef KILN_EXACT
+const uint kLevelsBinding = 13u;
+#else
+const uint kLevelsBinding = 9u;
+#endif
+layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
+#endif
 layout(push_constant) uniform Push { ShadowPush push; };
 // False: code is only asked for horizons, no ray marches along it.
 layout(constant_id = 5) const bool kAlongCode = true;
 
+#ifdef KILN_LEVELS
+#include "render/passes/level_map.glsl"
+#endif
 #include "render/passes/map.glsl"
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
@@ -70,13 +81,55 @@ float grid_gap(vec3 local) {
     return length(max(max(-local, local - size), vec3(0.0)));
 }
 
+// What shadow_field() answers in an empty cell, at `in_cell` voxels from its corner: what lies around it is a cube of cells like it.
+vec3 empty_cell(bool solid, int jump, vec3 in_cell, vec3 direction) {
+    float around = float(max(jump - 1, 0) * kBrickVoxels);
+    vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
+    float least = max(min(min(to_face.x, to_face.y), to_face.z) + around, 0.0) + kClearOfEmptyCell;
+    if (solid) return vec3(-least, least, 0.0);
+    // The ray itself: to where it leaves that cube.
+    vec3 ahead = mix(in_cell, float(kBrickVoxels) - in_cell, greaterThan(direction, vec3(0.0))) + around;
+    vec3 leaves = ahead / max(abs(direction), vec3(1e-6));
+    return vec3(kFarAway, least, min(min(leaves.x, leaves.y), leaves.z) + kPastFace);
+}
+
+#ifdef KILN_LEVELS
+// What the finest level that has the place knows of it.
+vec3 level_shadow(ivec3 whole, vec3 part, vec3 direction) {
+    vec3 away = abs(vec3(whole - ivec3(levels.focus_x, levels.focus_y, levels.focus_z)) +
+                    (part - vec3(levels.part_x, levels.part_y, levels.part_z)));
+    float largest = max(max(away.x, away.y), away.z);
+    float reach = level_reach(levels.cells);
+    for (int level = levels.first; level < levels.count; ++level) {
+        float size = float(1 << level);
+        if (largest >= reach * size) continue;
+        ivec3 texel = whole >> level;
+        ivec3 cell = ivec3(cell_of_texel(texel.x), cell_of_texel(texel.y), cell_of_texel(texel.z));
+        uint word = level_word(level, cell);
+        if (word == kCellMissing) continue;
+        vec3 in_cell = vec3(texel - cell * kBrickVoxels) + (vec3(whole & ((1 << level) - 1)) + part) / size;
+        if ((word & kCellOccupied) != 0u) {
+            float d = sampled_distance(int(word & kCellSlotMask), in_cell);
+            return vec3(d >= kSaturatedVoxels ? kFarAway : d * size, max(abs(d) - kTrilinearErrorVoxels, 0.01) * size, 0.0);
+        }
+        vec3 seen = empty_cell((word & kCellInside) != 0u, int(word & 7u), in_cell, direction);
+        return vec3(seen.x >= kFarAway ? kFarAway : seen.x * size, seen.y * size, seen.z * size);
+    }
+    return vec3(kFarAway, 1.0, 0.0);
+}
+#endif
+
 // For soft_shadow.gpu.h, in voxels.
 vec3 shadow_field(vec3 p, vec3 direction) {
     ivec3 whole = shadow_whole - grid_first_cell() * kBrickVoxels;
     vec3 local = vec3(whole) + p;
     ivec3 cell = ivec3(floor(local / float(kBrickVoxels)));
     bool inside_grid = in_grid(cell);
+#ifdef KILN_LEVELS
+    uint word = 0u;
+#else
     uint word = inside_grid ? shadow_cell_word(cell) : 0u;
+#endif
     bool occupied = (word & kCellOccupied) != 0u;
     int slot = int(word & kCellSlotMask);
 #ifdef KILN_EXACT
@@ -95,21 +148,17 @@ vec3 shadow_field(vec3 p, vec3 direction) {
     }
 #endif
     if (!inside_grid) return vec3(kFarAway, grid_gap(local) + 0.25, 0.0);
+#ifdef KILN_LEVELS
+    vec3 below = floor(p);
+    return level_shadow(shadow_whole + ivec3(below), p - below, direction);
+#else
     vec3 in_cell = local - vec3(cell * kBrickVoxels);
     if (occupied) {
         float d = sampled_distance(slot, in_cell);
         return vec3(d >= kSaturatedVoxels ? kFarAway : d, max(abs(d) - kTrilinearErrorVoxels, 0.01), 0.0);
     }
-    // To the nearest face of the cube of cells that are empty.
-    vec3 to_face = min(in_cell, float(kBrickVoxels) - in_cell);
-    float around = float(max(int(word & 7u) - 1, 0) * kBrickVoxels);
-    float rim = min(min(to_face.x, to_face.y), to_face.z) + around;
-    float least = max(rim, 0.0) + kClearOfEmptyCell;
-    if ((word & kCellInside) != 0u) return vec3(-least, least, 0.0);
-    // The ray itself: to where it leaves that cube.
-    vec3 ahead = mix(in_cell, float(kBrickVoxels) - in_cell, greaterThan(direction, vec3(0.0))) + around;
-    vec3 leaves = ahead / max(abs(direction), vec3(1e-6));
-    return vec3(kFarAway, least, min(min(leaves.x, leaves.y), leaves.z) + kPastFace);
+    return empty_cell((word & kCellInside) != 0u, int(word & 7u), in_cell, direction);
+#endif
 }
 
 #include "render/lib/soft_shadow.gpu.h"
@@ -136,8 +185,9 @@ void main() {
         float t = uintBitsToFloat(seen.x);
         float h = frame.grid.voxel_size;
         // One voxel off the surface; a pixel, where pixels are larger than voxels.
-        float off = max(1.0, 1.5 * frame.pixel_angle * t);
-        if (state != kSeenOutside) off = min(off, 2.0);  // what bricks hold is exact to a voxel: farther would leave small hollows
+        float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
+        float off = max(voxel, 1.5 * frame.pixel_angle * t);
+        if (state != kSeenOutside) off = min(off, 2.0 * voxel);  // what bricks hold is exact to a voxel: farther would leave small hollows
         vec3 from = ray.part + ray.direction * t + surface.normal * off;
         shadow_whole = ray.whole + ivec3(floor(from));
         vec3 p = from - floor(from);

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+#include "field/cell_maker.h"
+
+#include <cmath>
+
+namespace kiln::field {
+namespace {
+
+constexpr float kHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
+constexpr int kFarCell = 1 << 28;            // beyond any cell that has texels
+
+}  // namespace
+
+vec3 origin_of_block(ivec3 block, float voxel_size) {
+    const auto axis = [&](int first) {
+        const bool near = first < kNearCells && first + kBlockCells > -kNearCells;
+        return near ? 0.0f : float((double(first) + 0.5 * kBlockCells) * kBrickVoxels * double(voxel_size));
+    };
+    return {axis(block.x), axis(block.y), axis(block.z)};
+}
+
+CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size) {
+    const sdf::EditSpan& span = program.edits[row];
+    if (span.count == 0) return {};
+    if (span.everywhere()) return {all_of(-kFarCell), all_of(kFarCell)};
+    const float far = influence_reach(voxel_size);
+    const sdf::IndexedEdit edit = span.indexed(row);
+    const float more = program.index.blend_allowance(edit.influence(far), far, row);
+    const Box3 box = edit.influence(far + more);
+    const double side = double(voxel_size) * kBrickVoxels;
+    const auto cell = [&](double at) { return int(std::clamp(std::floor(at), double(-kFarCell), double(kFarCell))); };
+    // Far out, boxes are rounded where they lie.
+    const auto more_cells = [&](float a) {
+        return 0.01 + (std::fabs(double(a)) > kNearCells * side ? 1e-6 * std::fabs(double(a)) / side : 0.0);
+    };
+    const auto low = [&](float a) { return cell(double(a) / side - more_cells(a)); };
+    const auto high = [&](float a) { return cell(double(a) / side + more_cells(a)) + 1; };
+    return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
+}
+
+bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows) {
+    if (rows.empty()) return false;
+    return std::any_of(code.begin(), code.end(), [&](sdf::Instruction in) {
+        return in.has_material() &&
+               std::find(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2])) != rows.end();
+    });
+}
+
+// Rows that reach the box of cells, in order.
+void CellMaker::find_rows(const CellBox& box) {
+    const float side = lattice_.voxel_size * kBrickVoxels;
+    const ivec3 first = lattice_.first;
+    const auto world = [&](ivec3 c) {
+        return vec3{float(c.x + first.x) * side, float(c.y + first.y) * side, float(c.z + first.z) * side};
+    };
+    // Boxes of edits are rounded where they lie.
+    const float rounding = rebased_ != nullptr ? 1e-6f * lattice_.farthest : 0.0f;
+    const Box3 wide = Box3{world(box.min), world(box.max)}.inflated(0.01f * lattice_.voxel_size + rounding);
+    rows_.clear();
+    program_->index.find(wide, far_ + program_->index.blend_allowance(wide, far_), rows_);
+    std::sort(rows_.begin(), rows_.end(),
+              [&](uint32_t a, uint32_t b) { return program_->edits[a].order < program_->edits[b].order; });
+    if (rebased_ != nullptr) rebased_->move_to(lattice_.origin, rows_);
+}
+
+// Ball i around the cube of `size` cells whose least corner is `cell`: every texel of it lies inside, whatever float made of positions.
+void CellMaker::place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const {
+    const auto middle = [&](int c, float origin) {
+        if (origin == 0) return (float(c) * 7.0f + 3.5f * float(size)) * lattice_.voxel_size;
+        return float((double(c) * 7 + 3.5 * size) * double(lattice_.voxel_size) - double(origin));
+    };
+    balls.x[i] = middle(cell.x + lattice_.first.x, lattice_.origin.x);
+    balls.y[i] = middle(cell.y + lattice_.first.y, lattice_.origin.y);
+    balls.z[i] = middle(cell.z + lattice_.first.z, lattice_.origin.z);
+}
+
+// One radius for all.
+void CellMaker::size_balls(sdf::Balls& balls, int size) const {
+    const float h = lattice_.voxel_size, rounding = 5e-7f * lattice_.farthest;
+    balls.radius = kHalfDiagonal * float(size) * h + rounding;
+    balls.half_side = 3.5f * float(size) * h + rounding;
+    balls.far = far_;
+}
+
+// No texel of a ball whose centre has this value is near enough to the surface for a brick.
+bool CellMaker::beyond(float value, const sdf::Balls& balls) const {
+    const float v = std::fabs(value);
+    return v > balls.radius + lattice_.own_voxels * lattice_.voxel_size + 4e-6f * (lattice_.farthest + v);
+}
+
+// The cell of ball i; whether it owns a brick.
+bool CellMaker::evaluate(ivec3 cell, int i) {
+    culler_.emit(cells_, i, code_);
+    ball_ = i;
+    ++cells_evaluated_;
+    const ivec3 at = cell + lattice_.first;
+    const float least = evaluator_.evaluate(code_, {at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels});
+    return least < lattice_.own_voxels * lattice_.voxel_size;
+}
+
+}  // namespace kiln::field

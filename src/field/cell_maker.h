@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: MIT
+// CellMaker: what the cells of a lattice are, from a program's edits: empty on one side, or a brick with its pruned code and texels.
+// Fields (field.h) and levels (clipmap.h) are made of its answers. Cells are asked for in blocks of 16³: the index finds the edits that
+// reach the block, their list is folded at the centres of its 64 groups of 4³ cells, and for groups that may hold a surface at their 64 cells
+// (Barbier et al., "Lipschitz Pruning", 2025, branch in the same way); what is left of the list is a cell's code, which is
+// evaluated at its texels to see whether the cell owns a brick. What a cell is depends on nothing but the program and the cell.
+#pragma once
+
+#include "field/brick_content.h"
+#include "field/jumps.h"
+#include "sdf/cull.h"
+#include "sdf/rebase.h"
+
+#include <algorithm>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace kiln::field {
+
+inline constexpr int kBlockCells = 16;
+inline constexpr int kGroupCells = 4;
+
+/// How near an edit must come to change what is stored, metres.
+inline float influence_reach(float voxel_size) { return (kBandVoxels + 0.01f) * voxel_size; }
+
+/// What points of a block count from, floats: 0 on axes where the block is near the world's origin (texel_position).
+vec3 origin_of_block(ivec3 block, float voxel_size);
+
+struct CellLattice {
+    ivec3 first;           ///< world cell that cells are counted from
+    float voxel_size = 0;  ///< metres
+    float own_voxels = 1;  ///< a cell owns a brick iff some texel's |value| is below this many voxels
+    float farthest = 0;    ///< largest coordinate that is asked about, metres: decides what rounding may add
+    vec3 origin;           ///< world metres that points count from; not 0 only for one block, its origin_of_block()
+};
+
+inline bool contains(const CellBox& b, ivec3 c) {
+    return c.x >= b.min.x && c.y >= b.min.y && c.z >= b.min.z && c.x < b.max.x && c.y < b.max.y && c.z < b.max.z;
+}
+inline bool meet(const CellBox& a, const CellBox& b) {
+    return a.min.x < b.max.x && a.min.y < b.max.y && a.min.z < b.max.z && b.min.x < a.max.x && b.min.y < a.max.y &&
+           b.min.z < a.max.z;
+}
+inline ivec3 all_of(int a) { return {a, a, a}; }
+
+/// World cells whose bricks an edit can change; far beyond any world where it is everywhere. Empty: none.
+CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size);
+
+/// Whether a brick's code uses one of these rows.
+bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows);
+
+/// One thread's. A sink says which cells it wants and takes what they are:
+///     bool wants(const CellBox& cells)      whether it wants any of these; may err towards yes
+///     bool wants(ivec3 cell)
+///     bool stop()                           asked before each cell that may own a brick: leave the rest alone
+///     void air(const CellBox& cells)        these are empty and outside, also those it does not want
+///     void empty(ivec3 cell, bool inside)
+///     bool keeps(ivec3 cell, bool came)     its brick is as it was; `came`: one of `inserted` may be in its code
+///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
+class CellMaker {
+public:
+    CellMaker(const sdf::Program& program, const CellLattice& lattice, std::span<const uint32_t> inserted = {})
+        : program_(&program),
+          rebased_(lattice.origin == vec3{} ? nullptr : &sdf::Rebased::of(program)),
+          lattice_(lattice),
+          inserted_(inserted),
+          far_(influence_reach(lattice.voxel_size)),
+          culler_(rebased_ != nullptr ? rebased_->program() : program),
+          evaluator_(rebased_ != nullptr ? rebased_->program() : program, lattice.voxel_size, lattice.origin) {}
+
+    /// The cells of the block whose first is `at`; `bounds` cuts off what no one wants.
+    template <typename Sink>
+    void run_block(ivec3 at, const CellBox& bounds, Sink& sink);
+    /// All cells of a box, 64 at a time, without the hierarchy: for boxes of few cells.
+    template <typename Sink>
+    void run_box(const CellBox& box, Sink& sink);
+
+    /// As the program itself has it.
+    void append_code(std::vector<sdf::Instruction>& to) const {
+        to.insert(to.end(), code_.begin(), code_.end());
+        if (rebased_ == nullptr) return;
+        for (auto in = to.end() - ptrdiff_t(code_.size()); in != to.end(); ++in) *in = rebased_->original(*in);
+    }
+    uint32_t code_count() const { return uint32_t(code_.size()); }
+    const BrickEvaluator& evaluator() const { return evaluator_; }
+    std::optional<uint16_t> only_material() const { return culler_.only_material(cells_, ball_); }
+    uint64_t cells_tested() const { return cells_tested_; }        ///< balls folded at any level of the hierarchy
+    uint64_t cells_evaluated() const { return cells_evaluated_; }  ///< cells whose texels were looked at
+
+private:
+    // Row i of a group of 64: x fastest.
+    static ivec3 place_of(int i) { return {i & 3, i >> 2 & 3, i >> 4}; }
+    static ivec3 cell_in(ivec3 block, int group, int c) {
+        const ivec3 g = place_of(group), p = place_of(c);
+        return {block.x + g.x * kGroupCells + p.x, block.y + g.y * kGroupCells + p.y,
+                block.z + g.z * kGroupCells + p.z};
+    }
+
+    void find_rows(const CellBox& box);
+    void place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const;
+    void size_balls(sdf::Balls& balls, int size) const;
+    bool beyond(float value, const sdf::Balls& balls) const;
+    bool evaluate(ivec3 cell, int i);
+    template <typename Sink>
+    void run_cells(Sink& sink);
+
+    const sdf::Program* program_;
+    sdf::Rebased* rebased_;  // null where points count from the world's origin
+    CellLattice lattice_;
+    std::span<const uint32_t> inserted_;
+    float far_;
+    sdf::ListCuller culler_;
+    sdf::ListCuller::Fold groups_, cells_;
+    BrickEvaluator evaluator_;
+    std::vector<uint32_t> rows_;
+    std::vector<sdf::Instruction> code_;
+    ivec3 cell_[64];  // of the balls of cells_
+    int ball_ = 0;    // of the brick at hand
+    uint64_t cells_tested_ = 0, cells_evaluated_ = 0;
+};
+
+template <typename Sink>
+void CellMaker::run_block(ivec3 at, const CellBox& bounds, Sink& sink) {
+    const auto cut = [&](const CellBox& b) {
+        return CellBox{
+            {std::max(b.min.x, bounds.min.x), std::max(b.min.y, bounds.min.y), std::max(b.min.z, bounds.min.z)},
+            {std::min(b.max.x, bounds.max.x), std::min(b.max.y, bounds.max.y), std::min(b.max.z, bounds.max.z)}};
+    };
+    const CellBox block = cut({at, at + all_of(kBlockCells)});
+    find_rows(block);
+    if (rows_.empty()) {
+        sink.air(block);
+        return;
+    }
+    groups_.list = culler_.list_of(rows_);
+    groups_.balls.live = 0;
+    for (int i = 0; i < 64; ++i) {
+        const ivec3 first = cell_in(at, i, 0);
+        place_ball(groups_.balls, i, first, kGroupCells);
+        const CellBox group = cut({first, first + all_of(kGroupCells)});
+        if (!group.empty() && sink.wants(group)) groups_.balls.live |= uint64_t(1) << i;
+    }
+    size_balls(groups_.balls, kGroupCells);
+    culler_.fold(groups_);
+    uint64_t open = 0;
+    for (int i = 0; i < 64; ++i) {
+        if ((groups_.balls.live >> i & 1u) == 0) continue;
+        ++cells_tested_;
+        if (!beyond(groups_.value[i], groups_.balls)) {
+            open |= uint64_t(1) << i;
+            continue;
+        }
+        const ivec3 first = cell_in(at, i, 0);
+        if (groups_.value[i] >= 0) {
+            sink.air(cut({first, first + all_of(kGroupCells)}));
+            continue;
+        }
+        for (int c = 0; c < 64; ++c) {
+            const ivec3 cell = cell_in(at, i, c);
+            if (contains(bounds, cell) && sink.wants(cell)) sink.empty(cell, true);
+        }
+    }
+    culler_.keep(groups_, open);
+    for (int i = 0; i < 64 && !sink.stop(); ++i) {
+        if ((open >> i & 1u) == 0) continue;
+        cells_.list = culler_.child(groups_, i);
+        cells_.balls.live = 0;
+        for (int c = 0; c < 64; ++c) {
+            cell_[c] = cell_in(at, i, c);
+            place_ball(cells_.balls, c, cell_[c], 1);
+            if (contains(bounds, cell_[c]) && sink.wants(cell_[c])) cells_.balls.live |= uint64_t(1) << c;
+        }
+        run_cells(sink);
+        culler_.drop(cells_.list);
+    }
+    culler_.drop(groups_.list);
+}
+
+template <typename Sink>
+void CellMaker::run_box(const CellBox& box, Sink& sink) {
+    find_rows(box);
+    cells_.list = culler_.list_of(rows_);
+    int n = 0;
+    const auto run = [&] {
+        if (n == 0) return;
+        cells_.balls.live = n == 64 ? ~uint64_t(0) : (uint64_t(1) << n) - 1;
+        for (int i = n; i < 64; ++i) place_ball(cells_.balls, i, cell_[n - 1], 1);
+        run_cells(sink);
+        n = 0;
+    };
+    for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+            for (int x = box.min.x; x < box.max.x; ++x) {
+                const ivec3 cell{x, y, z};
+                if (!sink.wants(cell)) continue;
+                cell_[n] = cell;
+                place_ball(cells_.balls, n, cell, 1);
+                if (++n == 64) run();
+            }
+        }
+    }
+    run();
+    culler_.drop(cells_.list);
+}
+
+// cells_ has its list, its balls' places and which of them to look at.
+template <typename Sink>
+void CellMaker::run_cells(Sink& sink) {
+    size_balls(cells_.balls, 1);
+    culler_.fold(cells_);
+    uint64_t open = 0;
+    for (int i = 0; i < 64; ++i) {
+        if ((cells_.balls.live >> i & 1u) == 0) continue;
+        ++cells_tested_;
+        if (beyond(cells_.value[i], cells_.balls)) {
+            sink.empty(cell_[i], cells_.value[i] < 0);
+        } else {
+            open |= uint64_t(1) << i;
+        }
+    }
+    if (open == 0) return;
+    culler_.keep(cells_, open);
+    const uint64_t came = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
+    for (int i = 0; i < 64; ++i) {
+        if ((open >> i & 1u) == 0 || sink.keeps(cell_[i], (came >> i & 1u) != 0)) continue;
+        if (sink.stop()) return;
+        if (evaluate(cell_[i], i)) {
+            sink.brick(cell_[i], *this);
+        } else {
+            sink.empty(cell_[i], evaluator_.distances()[0] < 0);
+        }
+    }
+}
+
+}  // namespace kiln::field

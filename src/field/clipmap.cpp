@@ -1,0 +1,645 @@
+// SPDX-License-Identifier: MIT
+// Work is done in blocks of 16³ cells (cell_maker.h), several at a time; what they made is put in place by the owner's thread, in order, so
+// that with a budget in bricks alone nothing depends on the number of workers.
+//
+// Order of work: the last level, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are
+// missing too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser
+// level under it, and one mix of two levels is enough everywhere.
+
+#include "field/clipmap.h"
+
+#include "base/assert.h"
+#include "base/parallel_for.h"
+#include "base/profile.h"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+namespace kiln::field {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr uint32_t kUnlimited = std::numeric_limits<uint32_t>::max();
+constexpr int kMostBlocksAtOnce = 64;
+
+CellBox common(const CellBox& a, const CellBox& b) {
+    return {{std::max(a.min.x, b.min.x), std::max(a.min.y, b.min.y), std::max(a.min.z, b.min.z)},
+            {std::min(a.max.x, b.max.x), std::min(a.max.y, b.max.y), std::min(a.max.z, b.max.z)}};
+}
+CellBox wider(const CellBox& a, int by) { return {a.min - all_of(by), a.max + all_of(by)}; }
+int64_t volume(const CellBox& b) {
+    return b.empty() ? 0 : int64_t(b.max.x - b.min.x) * (b.max.y - b.min.y) * (b.max.z - b.min.z);
+}
+bool before(ivec3 a, ivec3 b) { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
+
+template <typename Fn>
+void each_cell(const CellBox& box, Fn&& fn) {
+    for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+            for (int x = box.min.x; x < box.max.x; ++x) fn(ivec3{x, y, z});
+        }
+    }
+}
+
+template <typename Fn>
+void each_block(const CellBox& box, Fn&& fn) {
+    if (box.empty()) return;
+    const auto first = [](int a) { return a & ~(kBlockCells - 1); };
+    for (int z = first(box.min.z); z < box.max.z; z += kBlockCells) {
+        for (int y = first(box.min.y); y < box.max.y; y += kBlockCells) {
+            for (int x = first(box.min.x); x < box.max.x; x += kBlockCells) fn(ivec3{x, y, z});
+        }
+    }
+}
+CellBox cells_of(ivec3 block) { return {block, block + all_of(kBlockCells)}; }
+
+}  // namespace
+
+// What is left of a budget.
+struct Clipmap::Run {
+    uint32_t bricks = kUnlimited;
+    bool timed = false;
+    Clock::time_point deadline{};
+    int workers = 0;
+
+    bool goes_on() const { return bricks > 0 && !(timed && Clock::now() >= deadline); }
+    void spend(size_t n) {
+        if (bricks != kUnlimited) bricks -= uint32_t(std::min<size_t>(n, bricks));
+    }
+    // Blocks at once, so that each may make a good number of bricks and time is asked for often.
+    size_t wave(size_t queued) const {
+        size_t n = kMostBlocksAtOnce;
+        if (timed) n = 2 * size_t(workers != 0 ? workers : hardware_workers());
+        if (bricks != kUnlimited) n = std::min<size_t>(n, std::clamp(bricks / 64u, 1u, 16u));
+        return std::min(n, queued);
+    }
+};
+
+Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const ClipmapOptions& options,
+                              dvec3 focus_world) {
+    const float h = options.voxel_size;
+    if (!(h > 0) || !std::isfinite(h))
+        return Error{"clipmap: voxel size " + std::to_string(h) + "; must be above 0", ErrorKind::Usage};
+    if (options.levels < 1 || options.levels > kMostLevels)
+        return Error{"clipmap: " + std::to_string(options.levels) + " levels; 1 to " + std::to_string(kMostLevels) +
+                         " are possible",
+                     ErrorKind::Usage};
+    if (options.cells < 32 || options.cells > 256 || !std::has_single_bit(uint32_t(options.cells)))
+        return Error{"clipmap: " + std::to_string(options.cells) + " cells a side; levels have 32, 64, 128 or 256",
+                     ErrorKind::Usage};
+    Clipmap out;
+    out.options_ = options;
+    out.options_.max_bricks = std::min(options.max_bricks, kCellSlotMask);  // the last is kCellMissing's
+    out.newest_ = std::move(program);
+    out.pool_ = BrickPool(out.options_.max_bricks);
+    out.focus_ = focus_world;
+    out.levels_.resize(size_t(options.levels));
+    for (int level = 0; level < options.levels; ++level) {
+        Level& l = out.levels_[size_t(level)];
+        l.cells = CellMap::torus(options.cells);
+        l.program = out.newest_;
+        l.first = out.first_cell_for(level, focus_world, nullptr);
+        out.enter(level, out.window(level));
+    }
+    out.settle();
+    return out;
+}
+
+CellBox Clipmap::window(int level) const {
+    const ivec3 first = levels_[size_t(level)].first;
+    return {first, first + all_of(options_.cells)};
+}
+
+LevelsParams Clipmap::params() const {
+    LevelsParams out{};
+    const double h = double(options_.voxel_size);
+    const double at[3] = {focus_.x / h, focus_.y / h, focus_.z / h};
+    const ivec3 whole{int(std::floor(at[0])), int(std::floor(at[1])), int(std::floor(at[2]))};
+    out.focus_x = whole.x, out.focus_y = whole.y, out.focus_z = whole.z;
+    out.part_x = float(at[0] - whole.x), out.part_y = float(at[1] - whole.y), out.part_z = float(at[2] - whole.z);
+    out.cells = options_.cells;
+    out.voxel_size = options_.voxel_size;
+    out.count = options_.levels;
+    const uint32_t all = uint32_t(options_.cells) * uint32_t(options_.cells) * uint32_t(options_.cells);
+    while (out.first + 1 < out.count && levels_[size_t(out.first)].counts.missing_cells == all) ++out.first;
+    return out;
+}
+
+// The window's first cell, an even number: its faces are faces of the coarser level's cells. An axis follows only when the focus is more
+// than kSlackCells off its middle.
+ivec3 Clipmap::first_cell_for(int level, dvec3 focus, const ivec3* old) const {
+    const double side = double(voxel_size(level)) * kBrickVoxels, half = options_.cells / 2;
+    const auto axis = [&](double at, const int* was) {
+        if (was != nullptr && std::fabs(at / side - (*was + half)) <= kSlackCells) return *was;
+        return int(2 * std::lround((at / side - half) / 2));
+    };
+    return {axis(focus.x, old != nullptr ? &old->x : nullptr), axis(focus.y, old != nullptr ? &old->y : nullptr),
+            axis(focus.z, old != nullptr ? &old->z : nullptr)};
+}
+
+CellLattice Clipmap::lattice(int level, ivec3 block) const {
+    const int far = std::max({std::abs(block.x), std::abs(block.y), std::abs(block.z)}) + 2 * kBlockCells;
+    const float h = voxel_size(level);
+    return {{}, h, kLevelOwnVoxels, float(far) * kBrickVoxels * h, origin_of_block(block, h)};
+}
+
+float Clipmap::distance_cells(int level, ivec3 cell) const {
+    const double side = double(voxel_size(level)) * kBrickVoxels;
+    return float(std::max({std::fabs(cell.x + 0.5 - focus_.x / side), std::fabs(cell.y + 0.5 - focus_.y / side),
+                           std::fabs(cell.z + 0.5 - focus_.z / side)}));
+}
+
+void Clipmap::queue_blocks(Level& level, const CellBox& box) const {
+    each_block(box, [&](ivec3 block) {
+        if (std::find(level.blocks.begin(), level.blocks.end(), block) == level.blocks.end())
+            level.blocks.push_back(block);
+    });
+}
+
+// These cells have come into the window, where others were before.
+void Clipmap::enter(int level, const CellBox& box) {
+    Level& l = levels_[size_t(level)];
+    each_cell(box, [&](ivec3 c) {
+        const uint32_t word = l.cells.at(c.x, c.y, c.z);
+        ++l.counts.entered_cells;
+        ++l.shell;
+        if (word == kCellMissing) return;
+        if ((word & kCellOccupied) != 0) {
+            release(level, word & kCellSlotMask);
+            ++l.counts.evicted;
+            room_ = true;
+        }
+        ++l.counts.missing_cells;
+        l.cells.set(c.x, c.y, c.z, kCellMissing);
+    });
+    l.changed.push_back(box);
+    queue_blocks(l, box);
+    if (l.active) add_parts(*l.active, box);
+}
+
+void Clipmap::move(dvec3 focus_world) {
+    focus_ = focus_world;
+    for (int level = 0; level < options_.levels; ++level) {
+        Level& l = levels_[size_t(level)];
+        l.counts.entered_cells = 0;
+        l.counts.evicted = 0;
+        const CellBox old = window(level);
+        l.first = first_cell_for(level, focus_world, &l.first);
+        const CellBox now = window(level);
+        if (now.min == old.min) continue;
+        std::erase_if(l.blocks, [&](ivec3 b) { return !meet(cells_of(b), now); });
+        std::erase_if(l.refused, [&](ivec3 b) { return !meet(cells_of(b), now); });
+        if (!meet(old, now)) {
+            enter(level, now);
+            continue;
+        }
+        CellBox rest = now;
+        const auto shell = [&](int ivec3::*axis) {
+            for (const bool low : {true, false}) {
+                CellBox slab = rest;
+                if (low) {
+                    slab.max.*axis = std::max(slab.min.*axis, old.min.*axis);
+                    rest.min.*axis = slab.max.*axis;
+                } else {
+                    slab.min.*axis = std::min(slab.max.*axis, old.max.*axis);
+                    rest.max.*axis = slab.min.*axis;
+                }
+                if (!slab.empty()) enter(level, slab);
+            }
+        };
+        shell(&ivec3::x);
+        shell(&ivec3::y);
+        shell(&ivec3::z);
+    }
+    settle();
+}
+
+void Clipmap::add_parts(Batch& batch, const CellBox& clip) const {
+    each_block(clip, [&](ivec3 block) {
+        const CellBox part = common(cells_of(block), clip);
+        if (std::any_of(batch.boxes.begin(), batch.boxes.end(), [&](const CellBox& b) { return meet(b, part); }))
+            batch.parts.push_back({block, part, {}});
+    });
+}
+
+void Clipmap::edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes) {
+    newest_ = std::move(program);
+    const int64_t all = int64_t(options_.cells) * options_.cells * options_.cells;
+    for (int level = 0; level < options_.levels; ++level) {
+        Level& l = levels_[size_t(level)];
+        if (l.counts.missing_cells == all) {  // nothing shows an old state
+            l.program = newest_;
+            l.active.reset();
+            l.waiting.reset();
+            continue;
+        }
+        std::optional<Batch>& batch = l.active ? l.waiting : l.active;
+        if (!batch) batch.emplace().since = works_;
+        batch->program = newest_;
+        ++batch->changes;
+        const auto add = [&](uint32_t row, std::vector<uint32_t>& rows) {
+            if (row == kNoRow) return;
+            rows.push_back(row);
+            const CellBox box = cells_reached(*newest_, row, voxel_size(level));
+            if (!box.empty()) batch->boxes.push_back(box);
+        };
+        for (const RowChange& change : changes) {
+            add(change.removed, batch->removed);
+            add(change.inserted, batch->inserted);
+        }
+        if (&batch != &l.active) continue;
+        add_parts(*batch, window(level));
+        if (batch->parts.empty()) {  // out of sight
+            l.program = newest_;
+            batch.reset();
+        }
+    }
+}
+
+namespace {
+
+// Between the cells of one block and what is made of them.
+template <typename Made>
+struct SinkBase {
+    Made& made;
+    DistanceFormat format;
+    uint32_t allowance;
+    bool timed;
+    Clock::time_point deadline;
+
+    bool stop() {
+        if (made.leaves.size() >= allowance || (timed && Clock::now() >= deadline)) made.stopped = true;
+        return made.stopped;
+    }
+    void add_brick(ivec3 cell, CellMaker& maker) {
+        ++made.cells;
+        made.leaves.push_back({cell, uint32_t(made.code.size()), maker.code_count(),
+                               maker.evaluator().content(format, maker.only_material())});
+        maker.append_code(made.code);
+    }
+};
+
+}  // namespace
+
+// Makes missing cells. True when the level has none left but refused ones.
+bool Clipmap::fill(int level, Run& run) {
+    Level& l = levels_[size_t(level)];
+    if (l.blocks.empty()) return true;
+    const CellBox window = this->window(level);
+
+    struct Sink : SinkBase<Made> {
+        const CellMap& cells;
+        bool wants(ivec3 c) const { return cells.at(c.x, c.y, c.z) == kCellMissing; }
+        bool wants(const CellBox& box) const {
+            for (int z = box.min.z; z < box.max.z; ++z) {
+                for (int y = box.min.y; y < box.max.y; ++y) {
+                    for (int x = box.min.x; x < box.max.x; ++x) {
+                        if (wants(ivec3{x, y, z})) return true;
+                    }
+                }
+            }
+            return false;
+        }
+        void air(const CellBox& box) {
+            each_cell(box, [&](ivec3 c) {
+                if (wants(c)) empty(c, false);
+            });
+        }
+        void empty(ivec3 c, bool inside) {
+            ++made.cells;
+            made.empties.push_back({c, inside});
+        }
+        static bool keeps(ivec3, bool) { return false; }
+        void brick(ivec3 c, CellMaker& maker) { add_brick(c, maker); }
+    };
+
+    std::sort(l.blocks.begin(), l.blocks.end(), [&](ivec3 a, ivec3 b) {
+        const ivec3 middle = all_of(kBlockCells / 2);
+        const float da = distance_cells(level, a + middle), db = distance_cells(level, b + middle);
+        return da != db ? da < db : before(a, b);
+    });
+    std::vector<ivec3> left;
+    size_t next = 0;
+    while (next < l.blocks.size() && run.goes_on()) {
+        const std::span<const ivec3> wave = std::span(l.blocks).subspan(next, run.wave(l.blocks.size() - next));
+        next += wave.size();
+        std::vector<Made> made(wave.size());
+        const uint32_t share = run.bricks == kUnlimited ? kUnlimited : std::max(run.bricks / uint32_t(wave.size()), 1u);
+        parallel_for(wave.size(), run.workers, [&](int i) {
+            CellMaker maker(*l.program, lattice(level, wave[size_t(i)]));
+            Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, l.cells};
+            maker.run_block(wave[size_t(i)], window, sink);
+        });
+        for (size_t i = 0; i < wave.size(); ++i) {
+            run.spend(made[i].leaves.size());
+            l.counts.baked += uint32_t(made[i].leaves.size());
+            l.counts.cells_made += made[i].cells;
+            publish(level, made[i], window);
+            if (made[i].stopped) left.push_back(wave[i]);
+        }
+    }
+    left.insert(left.end(), l.blocks.begin() + ptrdiff_t(next), l.blocks.end());
+    l.blocks = std::move(left);
+    return l.blocks.empty();
+}
+
+// Makes what changes reach, and shows it when it is whole. True when no change is left.
+bool Clipmap::apply(int level, Run& run) {
+    Level& l = levels_[size_t(level)];
+
+    struct Sink : SinkBase<Made> {
+        const Clipmap& map;
+        const Level& level;
+        const Batch& batch;
+        Part& part;
+
+        size_t bit(ivec3 c) const {
+            const ivec3 p = c - part.block;
+            return size_t((p.z * kBlockCells + p.y) * kBlockCells + p.x);
+        }
+        bool done(ivec3 c) const { return (part.done[bit(c) / 64] >> (bit(c) % 64) & 1u) != 0; }
+        void set_done(ivec3 c) {
+            ++made.cells;
+            part.done[bit(c) / 64] |= uint64_t(1) << (bit(c) % 64);
+        }
+        bool wants(const CellBox& box) const {
+            return std::any_of(batch.boxes.begin(), batch.boxes.end(), [&](const CellBox& b) { return meet(b, box); });
+        }
+        bool wants(ivec3 c) const {
+            return !done(c) && std::any_of(batch.boxes.begin(), batch.boxes.end(),
+                                           [&](const CellBox& b) { return contains(b, c); });
+        }
+        void air(const CellBox& box) {
+            each_cell(box, [&](ivec3 c) {
+                if (wants(c)) empty(c, false);
+            });
+        }
+        void empty(ivec3 c, bool inside) {
+            set_done(c);
+            const uint32_t word = level.cells.at(c.x, c.y, c.z);
+            if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside)
+                made.empties.push_back({c, inside});
+        }
+        bool keeps(ivec3 c, bool came) {
+            const uint32_t word = level.cells.at(c.x, c.y, c.z);
+            if (came || word == kCellMissing || (word & kCellOccupied) == 0) return false;
+            if (uses_any(map.code_of(word & kCellSlotMask), *batch.program, batch.removed)) return false;
+            set_done(c);
+            return true;
+        }
+        void brick(ivec3 c, CellMaker& maker) {
+            add_brick(c, maker);
+            part.done[bit(c) / 64] |= uint64_t(1) << (bit(c) % 64);
+        }
+    };
+
+    while (l.active) {
+        const CellBox window = this->window(level);
+        Batch& batch = *l.active;
+        std::vector<Part> left;
+        size_t next = 0;
+        while (next < batch.parts.size() && run.goes_on()) {
+            const size_t count = run.wave(batch.parts.size() - next);
+            const std::span<Part> wave = std::span(batch.parts).subspan(next, count);
+            next += count;
+            std::vector<Made> made(count);
+            const uint32_t share = run.bricks == kUnlimited ? kUnlimited : std::max(run.bricks / uint32_t(count), 1u);
+            parallel_for(count, run.workers, [&](int i) {
+                Part& part = wave[size_t(i)];
+                const CellBox bounds = common(part.clip, window);
+                if (bounds.empty()) return;
+                CellMaker maker(*batch.program, lattice(level, part.block), batch.inserted);
+                Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, *this, l, batch, part};
+                maker.run_block(part.block, bounds, sink);
+            });
+            for (size_t i = 0; i < count; ++i) {
+                run.spend(made[i].leaves.size());
+                l.counts.baked += uint32_t(made[i].leaves.size());
+                l.counts.cells_made += made[i].cells;
+                if (made[i].stopped) left.push_back(wave[i]);
+                made[i].stopped = false;
+                batch.made.push_back(std::move(made[i]));
+            }
+        }
+        left.insert(left.end(), batch.parts.begin() + ptrdiff_t(next), batch.parts.end());
+        batch.parts = std::move(left);
+        if (!batch.parts.empty()) return false;
+        std::vector<Made> made = std::move(batch.made);
+        l.program = batch.program;
+        l.active = std::move(l.waiting);
+        l.waiting.reset();
+        for (Made& m : made) publish(level, m, window);
+        if (!l.active) break;
+        add_parts(*l.active, window);
+    }
+    return true;
+}
+
+// Puts made cells in place; those that have left the window are dropped.
+void Clipmap::publish(int level, Made& made, const CellBox& window) {
+    Level& l = levels_[size_t(level)];
+    CellBox changed{};
+    for (const Emptied& e : made.empties) {
+        if (!contains(window, e.cell)) continue;
+        const uint32_t word = l.cells.at(e.cell.x, e.cell.y, e.cell.z);
+        const uint32_t empty = e.inside ? kCellInside : 0u;
+        if (word == kCellMissing) {
+            --l.counts.missing_cells;
+        } else if ((word & kCellOccupied) != 0) {
+            release(level, word & kCellSlotMask);
+            room_ = true;
+        }
+        const uint32_t jump = (word & kCellOccupied) != 0 ? uint32_t(kMaxJump) : word & 7u;
+        l.cells.set(e.cell.x, e.cell.y, e.cell.z, empty | jump);
+        changed = joined(changed, {e.cell, e.cell + all_of(1)});
+    }
+    const uint32_t base = uint32_t(code_.append(made.code));
+    for (Leaf& leaf : made.leaves) {
+        const ivec3 c = leaf.cell;
+        if (!contains(window, c)) continue;
+        const uint32_t word = l.cells.at(c.x, c.y, c.z);
+        const bool had = (word & kCellOccupied) != 0 && word != kCellMissing;
+        const uint32_t slot = had ? word & kCellSlotMask : take_slot(level, c);
+        changed = joined(changed, {c, c + all_of(1)});
+        if (slot == kNoSlot) {
+            if (word != kCellMissing) ++l.counts.missing_cells;
+            l.cells.set(c.x, c.y, c.z, kCellMissing);
+            const ivec3 block{c.x & ~(kBlockCells - 1), c.y & ~(kBlockCells - 1), c.z & ~(kBlockCells - 1)};
+            if (std::find(l.refused.begin(), l.refused.end(), block) == l.refused.end()) l.refused.push_back(block);
+            continue;
+        }
+        records_.resize_pages(slot / Field::Records::kPageSize + 1);
+        contents_.resize_pages(slot / Contents::kPageSize + 1);
+        BrickRecord& record = records_.write(slot);
+        live_code_ += uint64_t(leaf.code_count) - record.code_count;
+        const bool far = std::max({std::abs(c.x), std::abs(c.y), std::abs(c.z)}) >= kNearCells;
+        record = {c.x * kBrickVoxels, c.y * kBrickVoxels, c.z * kBrickVoxels, base + leaf.code_first,
+                  leaf.code_count,    uint32_t(level),    far ? 1u : 0u,      0};
+        contents_.write(slot) = std::move(leaf.content);
+        if (had) continue;
+        if (word == kCellMissing) --l.counts.missing_cells;
+        ++l.counts.bricks;
+        l.cells.set(c.x, c.y, c.z, kCellOccupied | slot);
+    }
+    if (!changed.empty()) l.changed.push_back(changed);
+}
+
+void Clipmap::release(int level, uint32_t slot) {
+    live_code_ -= records_[slot].code_count;
+    pool_.release(slot);
+    records_.write(slot) = {};
+    contents_.write(slot) = {};
+    --levels_[size_t(level)].counts.bricks;
+}
+
+uint32_t Clipmap::take_slot(int level, ivec3 cell) {
+    if (pool_.in_use() == options_.max_bricks && !give_back(level, cell)) return kNoSlot;
+    return pool_.allocate();
+}
+
+// Makes room for a brick by dropping the farthest one of the finest level that has any, where that matters less.
+bool Clipmap::give_back(int level, ivec3 cell) {
+    int finest = 0;
+    while (finest <= level && levels_[size_t(finest)].counts.bricks == 0) ++finest;
+    if (finest > level) return false;
+    Level& l = levels_[size_t(finest)];
+    if (victims_level_ != finest) {
+        victims_level_ = finest;
+        victims_.clear();
+        each_cell(window(finest), [&](ivec3 c) {
+            const uint32_t word = l.cells.at(c.x, c.y, c.z);
+            if ((word & kCellOccupied) != 0 && word != kCellMissing) victims_.push_back({distance_cells(finest, c), c});
+        });
+        std::sort(victims_.begin(), victims_.end(), [](const Victim& a, const Victim& b) {
+            return a.distance != b.distance ? a.distance < b.distance : before(a.cell, b.cell);
+        });
+    }
+    while (!victims_.empty()) {
+        const Victim victim = victims_.back();
+        const ivec3 c = victim.cell;
+        if (finest == level && victim.distance <= distance_cells(level, cell)) return false;
+        victims_.pop_back();
+        const uint32_t word = l.cells.at(c.x, c.y, c.z);
+        if ((word & kCellOccupied) == 0 || word == kCellMissing) continue;
+        release(finest, word & kCellSlotMask);
+        l.cells.set(c.x, c.y, c.z, kCellMissing);
+        ++l.counts.missing_cells;
+        ++l.counts.evicted;
+        l.changed.push_back({c, c + all_of(1)});
+        const ivec3 block{c.x & ~(kBlockCells - 1), c.y & ~(kBlockCells - 1), c.z & ~(kBlockCells - 1)};
+        if (std::find(l.refused.begin(), l.refused.end(), block) == l.refused.end()) l.refused.push_back(block);
+        return true;
+    }
+    victims_level_ = -1;  // those that came since
+    return false;
+}
+
+bool Clipmap::work(const BakeBudget& budget) {
+    KILN_PROFILE("clipmap work");
+    ++works_;
+    victims_level_ = -1;
+    for (Level& l : levels_) {
+        l.counts.baked = 0;
+        l.counts.cells_made = 0;
+        l.counts.skipped = false;
+        if (!room_) continue;
+        for (const ivec3 block : l.refused) queue_blocks(l, cells_of(block));
+        l.refused.clear();
+    }
+    room_ = false;
+
+    Run all{.workers = options_.workers};
+    const int last = options_.levels - 1;
+    apply(last, all);
+    fill(last, all);
+
+    Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
+    if (run.timed)
+        run.deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
+                                          std::chrono::duration<double>(std::max(budget.seconds, 0.0)));
+    std::vector<int> changes;
+    bool missing = false;
+    for (int level = 0; level < last; ++level) {
+        Level& l = levels_[size_t(level)];
+        if (l.active) changes.push_back(level);
+        // As many bricks as a sheet through the shell has, or twice that where a window is 64 cells.
+        l.counts.skipped = 2 * uint64_t(l.shell) / uint64_t(options_.cells) > budget.bricks;
+        missing = missing || (!l.blocks.empty() && !l.counts.skipped);
+    }
+    std::stable_sort(changes.begin(), changes.end(),
+                     [&](int a, int b) { return levels_[size_t(a)].active->since < levels_[size_t(b)].active->since; });
+    const auto apply_all = [&](Run& with) {
+        for (const int level : changes) {
+            if (!apply(level, with)) return;
+        }
+    };
+    if (missing && run.bricks != kUnlimited) {
+        Run half = run;
+        half.bricks = (run.bricks + 1) / 2;
+        const uint32_t given = half.bricks;
+        apply_all(half);
+        run.spend(given - half.bricks);
+    } else {
+        apply_all(run);
+    }
+    for (int level = last - 1; level >= 0; --level) {
+        if (levels_[size_t(level)].counts.skipped || !fill(level, run)) break;
+    }
+    apply_all(run);
+    for (Level& l : levels_) l.shell = 0;
+    settle();
+    compact_code();
+    return std::all_of(levels_.begin(), levels_.end(), [](const Level& l) { return l.blocks.empty() && !l.active; });
+}
+
+// Brings jumps, the marks of cells beside missing ones, and counts up to what changed.
+void Clipmap::settle() {
+    const int64_t all = int64_t(options_.cells) * options_.cells * options_.cells;
+    for (int level = 0; level < options_.levels; ++level) {
+        Level& l = levels_[size_t(level)];
+        const CellBox window = this->window(level);
+        int64_t cells = 0;
+        for (const CellBox& box : l.changed) cells += volume(wider(box, kMaxJump));
+        if (cells > all) l.changed.assign(1, window);
+        for (const CellBox& box : l.changed) {
+            each_cell(common(wider(box, 1), window), [&](ivec3 c) {
+                const uint32_t word = l.cells.at(c.x, c.y, c.z);
+                if ((word & kCellOccupied) == 0 || word == kCellMissing) return;
+                bool beside = false;
+                if (l.counts.missing_cells != 0) {
+                    each_cell(common({c - all_of(1), c + all_of(2)}, window),
+                              [&](ivec3 n) { beside = beside || l.cells.at(n.x, n.y, n.z) == kCellMissing; });
+                }
+                l.cells.set(c.x, c.y, c.z, (word & ~kCellFades) | (beside ? kCellFades : 0u));
+            });
+            const CellBox reached = wider(box, kMaxJump);
+            const ivec3 size = reached.max - reached.min;
+            update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);
+        }
+        l.changed.clear();
+        l.counts.edits_waiting = (l.active ? l.active->changes : 0) + (l.waiting ? l.waiting->changes : 0);
+        l.counts.refused_cells = 0;
+        for (const ivec3 block : l.refused) {
+            each_cell(common(cells_of(block), window),
+                      [&](ivec3 c) { l.counts.refused_cells += l.cells.at(c.x, c.y, c.z) == kCellMissing ? 1u : 0u; });
+        }
+    }
+}
+
+// Code that no brick uses any more is dropped once it is the larger part.
+void Clipmap::compact_code() {
+    if (code_.size() <= 2 * live_code_ + 4096) return;
+    AppendArray<sdf::Instruction> packed;
+    packed.reserve(size_t(3 * live_code_));
+    for (uint32_t slot = 0; slot < pool_.slot_count(); ++slot) {
+        if (!pool_.used(slot)) continue;
+        BrickRecord& record = records_.write(slot);
+        record.code_first = uint32_t(packed.append(code_.subspan(record.code_first, record.code_count)));
+    }
+    code_ = std::move(packed);
+}
+
+}  // namespace kiln::field

@@ -1,0 +1,187 @@
+// SPDX-License-Identifier: MIT
+// Clipmap: a field without an edge. Levels of cells around a focus (levels.gpu.h), each baked from the edits at its own resolution.
+// move() shifts windows: cells of the new shells are missing until work() has made them, coarse levels first, and the picture shows the next
+// coarser level there. edit() queues what a change reaches; a level shows it when all its bricks are made, the old ones until then. work()
+// keeps to a budget.
+//
+// At any time a level shows exactly one state of the world, level_program(): its bricks hold, bit for bit, what a field of that program
+// built from nothing would; but for missing cells. A value: a copy is cheap and shares every page that did not change, so snapshots
+// are kept by copying. Reading is for any thread; changing is the owner's.
+#pragma once
+
+#include "field/cell_maker.h"
+#include "field/field.h"
+#include "field/levels.gpu.h"
+
+#include <array>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace kiln::field {
+
+struct ClipmapOptions {
+    float voxel_size = 0.02f;  ///< of the finest level, metres
+    int levels = 6;            ///< [1, kMostLevels]
+    int cells = 64;            ///< a side of each level; a power of two, [32, 256]
+    DistanceFormat format = DistanceFormat::Half;
+    uint32_t max_bricks = 1u << 17;  ///< of all levels; the least important go when they are too many
+    int workers = 0;                 ///< 0: all cores
+};
+
+/// What one work() may cost. The last level is made whole whatever it costs, or the picture would have a hole.
+struct BakeBudget {
+    uint32_t bricks = std::numeric_limits<uint32_t>::max();
+    double seconds = std::numeric_limits<double>::infinity();  ///< asked between bricks: the last one ends late
+};
+
+/// Of one level; what is counted since the last move() or work() began is said so.
+struct LevelCounts {
+    uint32_t bricks = 0;         ///< resident
+    uint32_t missing_cells = 0;  ///< queued or refused
+    uint32_t entered_cells = 0;  ///< by the last move()
+    uint64_t cells_made = 0;     ///< by the last work(): looked at to the end
+    uint32_t baked = 0;          ///< bricks, by the last work()
+    uint32_t evicted = 0;  ///< bricks whose cells left, by the last move(); given to coarser levels, by the last work()
+    uint32_t refused_cells = 0;  ///< of the missing: the pool has no room for them
+    uint32_t edits_waiting = 0;  ///< changes that are queued here
+    bool skipped = false;        ///< by the last work(): its shell alone exceeds the budget
+};
+
+class Clipmap {
+public:
+    static Result<Clipmap> make(std::shared_ptr<const sdf::Program> program, const ClipmapOptions& options,
+                                dvec3 focus_world);
+
+    /// Shifts the levels' windows around the focus. Bakes nothing.
+    void move(dvec3 focus_world);
+    /// The world is `program` now, which is the last one with `changes` made.
+    void edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes);
+    /// Bakes what is queued, within the budget. True when nothing is left.
+    bool work(const BakeBudget& budget = {});
+
+    const ClipmapOptions& options() const { return options_; }
+    int level_count() const { return options_.levels; }
+    float voxel_size(int level) const { return options_.voxel_size * float(1 << level); }
+    dvec3 focus() const { return focus_; }
+    const LevelCounts& counts(int level) const { return levels_[size_t(level)].counts; }
+    const std::shared_ptr<const sdf::Program>& program() const { return newest_; }
+    const std::shared_ptr<const sdf::Program>& level_program(int level) const { return levels_[size_t(level)].program; }
+    /// First world cell of the window.
+    ivec3 first_cell(int level) const { return levels_[size_t(level)].first; }
+    CellBox window(int level) const;
+    const CellMap& cells(int level) const { return levels_[size_t(level)].cells; }
+    /// Word of a world cell in the window.
+    uint32_t cell_word(int level, ivec3 cell) const { return cells(level).at(cell.x, cell.y, cell.z); }
+    const Field::Records& records() const { return records_; }
+    const AppendArray<sdf::Instruction>& code() const { return code_; }
+    std::span<const sdf::Instruction> code_of(uint32_t slot) const {
+        return code_.subspan(records_[slot].code_first, records_[slot].code_count);
+    }
+    using Contents = PagedArray<BrickContent, 16>;
+    const BrickContent& content(uint32_t slot) const { return contents_[slot]; }
+    const Contents& contents() const { return contents_; }
+    uint32_t slot_count() const { return pool_.slot_count(); }
+    uint32_t bricks() const { return pool_.in_use(); }
+    LevelsParams params() const;
+
+    /// Distance to the surface as it is drawn, where a brick says: metres.
+    struct Sample {
+        int level = -1;  ///< -1: outside all levels, or nothing known
+        bool from_brick = false;
+        float distance = 0;  ///< not from_brick: only its sign is known
+    };
+    Sample sample(dvec3 p_world) const;
+    /// First hit along a ray through all levels; see level_march.gpu.h. t in metres.
+    struct Hit {
+        int state = kMarchMiss, level = -1;
+        double t = 0;
+        vec3 normal;  ///< unit
+        MarchHit march;
+    };
+    Hit cast(dvec3 origin_world, vec3 direction, double t_max, bool accelerate = true) const;
+
+private:
+    struct Leaf {
+        ivec3 cell;
+        uint32_t code_first = 0, code_count = 0;
+        BrickContent content;
+    };
+    struct Emptied {
+        ivec3 cell;
+        bool inside;
+    };
+    struct Made {
+        std::vector<Leaf> leaves;
+        std::vector<Emptied> empties;
+        std::vector<sdf::Instruction> code;
+        uint64_t cells = 0;
+        bool stopped = false;
+    };
+    // A block of cells that a change reaches, cut to a box; which of them are done.
+    struct Part {
+        ivec3 block;
+        CellBox clip;
+        std::array<uint64_t, 64> done{};
+    };
+    // Changes that a level will show at once.
+    struct Batch {
+        std::shared_ptr<const sdf::Program> program;
+        std::vector<CellBox> boxes;  // world cells
+        std::vector<uint32_t> removed, inserted;
+        std::vector<Part> parts;  // to do
+        std::vector<Made> made;
+        uint64_t since = 0;  // number of the work() before which it came
+        uint32_t changes = 0;
+    };
+    struct Level {
+        ivec3 first;
+        CellMap cells;
+        std::shared_ptr<const sdf::Program> program;
+        std::vector<ivec3> blocks;     // that have missing cells
+        std::vector<ivec3> refused;    // likewise, but no room
+        std::vector<CellBox> changed;  // since settle()
+        std::optional<Batch> active, waiting;
+        uint32_t shell = 0;  // cells that entered since the last work()
+        LevelCounts counts;
+    };
+    struct Run;
+
+    Clipmap() = default;
+    ivec3 first_cell_for(int level, dvec3 focus, const ivec3* old) const;
+    CellLattice lattice(int level, ivec3 block) const;
+    void enter(int level, const CellBox& box);
+    void queue_blocks(Level& level, const CellBox& box) const;
+    void add_parts(Batch& batch, const CellBox& clip) const;
+    bool fill(int level, Run& run);
+    bool apply(int level, Run& run);
+    void publish(int level, Made& made, const CellBox& window);
+    void release(int level, uint32_t slot);
+    uint32_t take_slot(int level, ivec3 cell);
+    bool give_back(int level, ivec3 cell);
+    void settle();
+    void compact_code();
+    float distance_cells(int level, ivec3 cell) const;
+
+    ClipmapOptions options_;
+    std::vector<Level> levels_;
+    std::shared_ptr<const sdf::Program> newest_;
+    dvec3 focus_;
+    Field::Records records_;
+    Contents contents_;
+    AppendArray<sdf::Instruction> code_;
+    uint64_t live_code_ = 0;
+    BrickPool pool_{0};
+    uint64_t works_ = 0;
+    struct Victim {
+        float distance;
+        ivec3 cell;
+    };
+    std::vector<Victim> victims_;  // of give_back(): bricks of a level, the farthest last
+    int victims_level_ = -1;
+    bool room_ = false;  // slots came free since cells were refused
+};
+
+}  // namespace kiln::field

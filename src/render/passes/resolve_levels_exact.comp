@@ -1,0 +1,10 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// Normals, materials and depth of points seen in bricks of any level and on exact programs.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#define KILN_LEVELS
+#include "field/levels.gpu.h"
+#define KILN_EXACT
+#include "render/passes/resolve.glsl"

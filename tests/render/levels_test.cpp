@@ -1,0 +1,219 @@
+// SPDX-License-Identifier: MIT
+// Clipmaps on the GPU: the same rays as on the CPU, the same texels after any history, and the picture of one level.
+
+#include "gpu_worlds.h"
+
+#include "field/clipmap.h"
+#include "image/metrics.h"
+
+#include <bit>
+#include <cmath>
+
+namespace kiln::render {
+namespace {
+
+using field::Clipmap;
+using field::worlds::Random;
+
+struct LevelsGpu : GpuTest {};
+
+std::vector<Edit> hills(uint32_t seed = 4) {
+    Random r(seed);
+    std::vector<Edit> edits{field::worlds::edit(Plane{}, {0, -0.4f, 0})};
+    for (int i = 0; i < 90; ++i) {
+        const float spread = i % 3 == 0 ? 5.0f : 30.0f;
+        Edit e = i % 4 == 0 ? field::worlds::edit(Box{.half_extents = {r.in(0.1f, 1), r.in(0.2f, 2), r.in(0.1f, 1)}})
+                            : field::worlds::edit(Sphere{.radius = r.in(0.3f, 2)}, {},
+                                                  i % 5 == 1 ? Op::Subtract : Op::Union, i % 2 == 0 ? 0.2f : 0.0f);
+        e.node.transform.position = {r.in(-spread, spread), r.in(-0.8f, 0.2f), r.in(-spread, spread)};
+        e.node.transform.rotation = axis_angle(r.direction(), r.in(-3, 3));
+        e.node.material = MaterialId{uint32_t(r.below(5)), 0};
+        edits.push_back(e);
+    }
+    return edits;
+}
+
+Clipmap made(std::shared_ptr<const sdf::Program> program, dvec3 focus, float h = 0.05f, int levels = 4) {
+    auto out = Clipmap::make(std::move(program), {.voxel_size = h, .levels = levels, .cells = 32}, focus);
+    EXPECT_TRUE(out);
+    return std::move(*out);
+}
+
+TEST_F(LevelsGpu, RaysMeetWhatTheyMeetOnTheCpuWhileCellsAreMissingToo) {
+    Clipmap map = made(field::worlds::compiled(hills()), {0, 1.5, 0});
+    GpuField gpu(*runner_);
+    for (const int step : {0, 1, 2, 3}) {
+        if (step == 0) map.work({.bricks = 0});
+        if (step == 1) map.work({.bricks = 2500});
+        if (step == 2) map.work();
+        if (step == 3) map.move({1.4, 1.6, -0.9});
+        rhi::must(gpu.update(map));
+        Random r(uint32_t(11 + step));
+        std::vector<FrameRay> rays;
+        for (int i = 0; i < 4096; ++i) {
+            vec3 d = r.direction();
+            d.y = -std::fabs(d.y) * (i % 2 == 0 ? 1.0f : 0.15f);
+            d = normalize(d);
+            FrameRay ray{};
+            ray.whole_x = int(r.in(-40, 40)), ray.whole_y = 60, ray.whole_z = int(r.in(-40, 40));
+            ray.part_x = ray.part_z = 0.25f;
+            ray.direction_x = d.x, ray.direction_y = d.y, ray.direction_z = d.z;
+            rays.push_back(ray);
+        }
+        for (const bool accelerate : {true, false}) {
+            FrameParams p{};
+            p.grid = gpu.grid();
+            p.distance_scale = gpu.distance_scale();
+            p.width = p.tile_width = p.height = p.tile_height = 64;
+            p.flags = kFrameRays | (accelerate ? kFrameAccelerate : 0u);
+            Graph g(*runner_);
+            TileInputs in;
+            in.field = gpu.import(g);
+            in.frame = g.block(p);
+            in.levels = true;
+            in.levels_block = g.block(gpu.levels());
+            in.rays = g.upload("rays", std::span<const FrameRay>(rays));
+            in.size = {64, 64};
+            const Readback words = g.readback(march(g, in).words);
+            rhi::must(runner_->execute(g));
+            const auto all = rhi::must(words.get_as<uint32_t>());
+            int hits = 0, wrong = 0, far = 0, by_level[4] = {};
+            for (size_t i = 0; i < rays.size(); ++i) {
+                const FrameRay& q = rays[i];
+                const double h = double(map.options().voxel_size);
+                const Clipmap::Hit want = map.cast(
+                    {h * (q.whole_x + double(q.part_x)), h * double(q.whole_y), h * (q.whole_z + double(q.part_z))},
+                    {q.direction_x, q.direction_y, q.direction_z}, 1e30, accelerate);
+                const uint32_t state = all[4 * i + 1] >> 28;
+                const uint32_t expected = want.state == field::kMarchHit    ? kSeenBrick
+                                          : want.state == field::kMarchMiss ? kSeenNothing
+                                                                            : kSeenInside;
+                // A ray that grazes may go either way by rounding; it is counted.
+                if (state != expected) {
+                    ++wrong;
+                    continue;
+                }
+                if (state != kSeenBrick) continue;
+                ++hits;
+                const int level = int(all[4 * i + 2] >> kSeenLevelShift);
+                const double off = std::fabs(double(std::bit_cast<float>(all[4 * i])) - want.t / h) / (1 << level);
+                far += level != want.level || off > 1e-2;
+                ++by_level[level];
+            }
+            EXPECT_LE(wrong, 2) << "step " << step;
+            EXPECT_LE(far, 4) << "step " << step;
+            EXPECT_GT(hits, 2500) << "step " << step;
+            EXPECT_GT(by_level[3], 50);
+            if (step >= 2) {
+                EXPECT_GT(by_level[0], 200);
+            }
+        }
+    }
+}
+
+TEST_F(LevelsGpu, TexelsAreTheClipmapsAfterMovesAndChanges) {
+    std::vector<Edit> edits = hills();
+    field::worlds::Live live(edits);
+    Clipmap map = made(live.program(), {0, 1, 0});
+    map.work();
+    GpuField gpu(*runner_);
+    rhi::must(gpu.update(map));
+    const uint32_t all = gpu.bricks_baked();
+    EXPECT_EQ(all, map.bricks());
+    for (int step = 0; step < 4; ++step) {
+        map.move({0.8 * step, 1, 0.3 * step});
+        edits.push_back(field::worlds::edit(Sphere{.radius = 0.4f}, {0.5f * float(step), -0.3f, 0.6f}, Op::Subtract));
+        map.edit(live.program(), live.become(edits));
+        map.work();
+        rhi::must(gpu.update(map));
+        EXPECT_GT(gpu.bricks_baked(), 0u);
+        EXPECT_LT(gpu.bricks_baked(), all / 2) << "only what changed is written";
+    }
+    rhi::must(gpu.update(map));
+    EXPECT_EQ(gpu.bricks_baked(), 0u);
+    std::vector<uint32_t> slots;
+    for (uint32_t slot = 0; slot < map.slot_count(); ++slot) {
+        if (map.content(slot)) slots.push_back(slot);
+    }
+    const auto texels = rhi::must(gpu.read_back(slots));
+    int wrong = 0;
+    for (size_t i = 0; i < slots.size(); ++i) {
+        const field::BrickContent& brick = map.content(slots[i]);
+        for (size_t t = 0; t < 512; ++t)
+            wrong += texels[i].distance_codes[t] != (*brick.half)[t] || texels[i].material_words[t] != brick.word(t);
+        for (size_t k = 0; k < 16; ++k) wrong += texels[i].palette[k] != brick.palette(k);
+    }
+    EXPECT_EQ(wrong, 0);
+}
+
+Frame seen_from(const Clipmap& map, vec3 eye, vec3 target) {
+    Frame frame = frame_of(field::worlds::sphere_of(4));
+    frame.field = nullptr;
+    frame.levels = std::make_shared<const Clipmap>(map);
+    frame.camera.position = eye;
+    frame.camera.target = target;
+    return frame;
+}
+
+image::Rgb shown(const Picture& picture) {
+    image::Rgb out{picture.width, picture.height, {}};
+    for (size_t i = 0; i < picture.srgb.size(); ++i) {
+        if (i % 4 != 3) out.values.push_back(float(picture.srgb[i]) / 255);
+    }
+    return out;
+}
+
+TEST(Levels, DrawWhatOneLevelDraws) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP();
+    const field::worlds::World world = on_ground();
+    Frame one = frame_of(world);
+    // So small that the world reaches into the third level.
+    Clipmap map = made(field::worlds::compiled(world.source()), {2.2, 1.5, 2.6}, 0.02f, 5);
+    map.work();
+    Frame levels = seen_from(map, one.camera.position, one.camera.target);
+    for (const bool refine : {true, false}) {
+        const RenderSettings settings{.width = 160, .height = 120, .refine = refine};
+        auto a = renderer->render(one, settings);
+        auto b = renderer->render(levels, settings);
+        ASSERT_TRUE(a && b) << (a ? "" : a.error().message) << (b ? "" : b.error().message);
+        int off = 0;
+        for (size_t i = 0; i < a->depth.size(); ++i) {
+            if (std::isinf(a->depth[i]) && std::isinf(b->depth[i])) continue;
+            off += !(std::fabs(a->depth[i] - b->depth[i]) < (refine ? 0.005f : 0.05f) * a->depth[i]);
+        }
+        EXPECT_LE(off, 160) << "of " << a->depth.size() << ", refine " << refine;
+        EXPECT_LE(image::flip(shown(*a), shown(*b)), refine ? 0.01 : 0.05) << "refine " << refine;
+    }
+    EXPECT_EQ(renderer->stats().levels.size(), 5u);
+    EXPECT_FALSE(renderer->render(levels, {.width = 16, .height = 16, .analytic = true}));
+}
+
+// Levels snap to new places under a camera that goes a centimetre a frame.
+TEST(Levels, NothingPopsOnADolly) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP();
+    Clipmap map = made(field::worlds::compiled(hills()), {0, 0.9, 3}, 0.02f, 6);
+    map.work();
+    std::optional<image::Rgb> last;
+    double worst = 0;
+    int snaps = 0;
+    for (int frame = 0; frame < 40; ++frame) {
+        const float z = 3 - 0.01f * float(frame);
+        const field::ivec3 first = map.first_cell(0);
+        map.move({0, 0.9, double(z)});
+        map.work();
+        snaps += !(map.first_cell(0) == first);
+        auto picture =
+            renderer->render(seen_from(map, {0, 0.9f, z}, {0.4f, 0.2f, z - 4}), {.width = 128, .height = 72});
+        ASSERT_TRUE(picture) << picture.error().message;
+        image::Rgb now = shown(*picture);
+        if (last) worst = std::max(worst, image::flip(*last, now));
+        last = std::move(now);
+    }
+    EXPECT_GE(snaps, 1);
+    EXPECT_LE(worst, 0.02);
+}
+
+}  // namespace
+}  // namespace kiln::render
