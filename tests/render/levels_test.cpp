@@ -23,8 +23,8 @@ std::vector<Edit> hills(uint32_t seed = 4) {
     for (int i = 0; i < 90; ++i) {
         const float spread = i % 3 == 0 ? 5.0f : 30.0f;
         Edit e = i % 4 == 0 ? field::worlds::edit(Box{.half_extents = {r.in(0.1f, 1), r.in(0.2f, 2), r.in(0.1f, 1)}})
-                            : field::worlds::edit(Sphere{.radius = r.in(0.3f, 2)}, {}, i % 5 == 1 ? Op::Subtract : Op::Union,
-                                                  i % 2 == 0 ? 0.2f : 0.0f);
+                            : field::worlds::edit(Sphere{.radius = r.in(0.3f, 2)}, {},
+                                                  i % 5 == 1 ? Op::Subtract : Op::Union, i % 2 == 0 ? 0.2f : 0.0f);
         e.node.transform.position = {r.in(-spread, spread), r.in(-0.8f, 0.2f), r.in(-spread, spread)};
         e.node.transform.rotation = axis_angle(r.direction(), r.in(-3, 3));
         e.node.material = MaterialId{uint32_t(r.below(5)), 0};
@@ -81,9 +81,9 @@ TEST_F(LevelsGpu, RaysMeetWhatTheyMeetOnTheCpuWhileCellsAreMissingToo) {
             for (size_t i = 0; i < rays.size(); ++i) {
                 const FrameRay& q = rays[i];
                 const double h = double(map.options().voxel_size);
-                const Clipmap::Hit want =
-                    map.cast({h * (q.whole_x + double(q.part_x)), h * double(q.whole_y), h * (q.whole_z + double(q.part_z))},
-                             {q.direction_x, q.direction_y, q.direction_z}, 1e30, accelerate);
+                const Clipmap::Hit want = map.cast(
+                    {h * (q.whole_x + double(q.part_x)), h * double(q.whole_y), h * (q.whole_z + double(q.part_z))},
+                    {q.direction_x, q.direction_y, q.direction_z}, 1e30, accelerate);
                 const uint32_t state = all[4 * i + 1] >> 28;
                 const uint32_t expected = want.state == field::kMarchHit    ? kSeenBrick
                                           : want.state == field::kMarchMiss ? kSeenNothing
@@ -204,7 +204,8 @@ TEST(Levels, NothingPopsOnADolly) {
         map.move({0, 0.9, double(z)});
         map.work();
         snaps += !(map.first_cell(0) == first);
-        auto picture = renderer->render(seen_from(map, {0, 0.9f, z}, {0.4f, 0.2f, z - 4}), {.width = 128, .height = 72});
+        auto picture =
+            renderer->render(seen_from(map, {0, 0.9f, z}, {0.4f, 0.2f, z - 4}), {.width = 128, .height = 72});
         ASSERT_TRUE(picture) << picture.error().message;
         image::Rgb now = shown(*picture);
         if (last) worst = std::max(worst, image::flip(*last, now));
