@@ -46,7 +46,7 @@ def place_islands():
     hero = [(62.0, 18.0, 62.0), (-74.0, -58.0, 55.0), (96.0, -190.0, 70.0), (-66.0, -300.0, 58.0)]
     out = list(hero)
     while len(out) < ISLANDS:
-        angle, far = rng.uniform(0, 2 * math.pi), REACH * math.sqrt(rng.uniform(0.002, 1))
+        angle, far = rng.uniform(0, 2 * math.pi), REACH * rng.uniform(0.03, 1) ** 0.8
         x, z = far * math.sin(angle), far * math.cos(angle)
         size = rng.uniform(24, 60) + 55 * rng.random() ** 3 * far / REACH
         if abs(x - lane(z)) < 0.75 * size + 26 and abs(z) < 1500:
@@ -118,7 +118,6 @@ def island(x, z, size):
     return len(edits) - first
 
 
-add({"shape": "plane"}, (0, 0, 0), material="sea", id="sea")
 for x, z, size in place_islands():
     island(x, z, size)
 # The arch that the flight goes through, and lamps in the cave behind it.
@@ -132,16 +131,19 @@ for i in range(9):
     add({"shape": "octahedron", "radius": 0.45}, (lane(gate) + 12.6 * math.cos(a), 2.0 + 12.6 * math.sin(a), gate + 0.4), material="lamp",
         rotation=turned(a, 0.4))
 
+# Last, so that it fills what was cut.
+add({"shape": "plane"}, (0, 0, 0), material="sea", id="sea")
+
 cameras = {}
 
 
 def camera(name, z, height, aim_z, aim_height, off=0.0, fov=52):
-    cameras[name] = {"position": r3((lane(z) + off, height, z)), "target": r3((lane(aim_z), aim_height, aim_z)), "fov_y_deg": fov, "exposure": 1.0, "tone_map": "aces"}
+    cameras[name] = {"position": r3((lane(z) + off, height, z)), "target": r3((lane(aim_z), aim_height, aim_z)), "fov_y_deg": fov, "exposure": 1.15, "tone_map": "aces"}
 
 
-camera("approach", 150, 26, -110, 8, -6)
+camera("approach", 150, 17, -110, 8, -6, 46)
 camera("shallows", 60, 7, -118, 9, 3)
-camera("gate", -60, 6.5, -200, 9, 0)
+camera("gate", -72, 6.5, -170, 10, 0)
 camera("through", -128, 7.5, -280, 12, 0)
 camera("sound", -230, 14, -460, 16, 4)
 camera("rise", -380, 58, -900, 20, 0)
@@ -152,12 +154,12 @@ scene = {
     "description": "islands, caves and open water to the horizon, to fly through",
     "field": {"voxel_size": 0.08, "levels": 8},
     "materials": {
-        "rock": {"base_color": [0.3, 0.27, 0.23], "roughness": 0.9},
+        "rock": {"base_color": [0.2, 0.175, 0.15], "roughness": 0.9},
         "slate": {"base_color": [0.17, 0.18, 0.2], "roughness": 0.7},
-        "cliff": {"base_color": [0.46, 0.4, 0.32], "roughness": 0.9},
+        "cliff": {"base_color": [0.34, 0.28, 0.21], "roughness": 0.9},
         "cave": {"base_color": [0.24, 0.16, 0.12], "roughness": 0.8},
-        "sand": {"base_color": [0.6, 0.5, 0.34], "roughness": 0.95},
-        "grass": {"base_color": [0.11, 0.2, 0.05], "roughness": 0.95},
+        "sand": {"base_color": [0.5, 0.4, 0.26], "roughness": 0.95},
+        "grass": {"base_color": [0.1, 0.15, 0.04], "roughness": 0.95},
         "needles": {"base_color": [0.04, 0.1, 0.05], "roughness": 0.95},
         "bark": {"base_color": [0.12, 0.07, 0.04], "roughness": 0.9},
         "sea": {"base_color": [0.015, 0.07, 0.09], "roughness": 0.12},
@@ -169,7 +171,7 @@ scene = {
             {"shape": "cone", "half_height": 0.42, "radius_bottom": 0.5, "radius_top": 0.08, "material": "needles"},
             {"shape": "cone", "half_height": 0.4, "radius_bottom": 0.36, "radius_top": 0.02, "position": [0, 0.5, 0], "material": "needles"}]},
     },
-    "lights": [{"type": "directional", "direction": [-0.62, -0.42, -0.5], "illuminance": 3.4, "color": [1, 0.88, 0.72], "angular_diameter_deg": 0.9}],
+    "lights": [{"type": "directional", "direction": [-0.86, -0.36, -0.22], "illuminance": 4.6, "color": [1, 0.84, 0.64], "angular_diameter_deg": 0.9}],
     "cameras": cameras,
 }
 keys = list(scene.items())

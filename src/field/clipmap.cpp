@@ -87,8 +87,9 @@ Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const
         return Error{"clipmap: " + std::to_string(options.levels) + " levels; 1 to " + std::to_string(kMostLevels) +
                          " are possible",
                      ErrorKind::Usage};
-    if (options.cells < 32 || options.cells > 256 || !std::has_single_bit(uint32_t(options.cells)))
-        return Error{"clipmap: " + std::to_string(options.cells) + " cells a side; levels have 32, 64, 128 or 256",
+    if (options.cells < kFewestLevelCells || options.cells > kMostLevelCells ||
+        !std::has_single_bit(uint32_t(options.cells)))
+        return Error{"clipmap: " + std::to_string(options.cells) + " cells a side; levels have 32, 64 or 128",
                      ErrorKind::Usage};
     Clipmap out;
     out.options_ = options;

@@ -25,7 +25,7 @@ namespace kiln::field {
 struct ClipmapOptions {
     float voxel_size = 0.02f;  ///< of the finest level, metres
     int levels = 6;            ///< [1, kMostLevels]
-    int cells = 64;            ///< a side of each level; a power of two, [32, 256]
+    int cells = 64;            ///< a side of each level; a power of two, [32, 128]
     DistanceFormat format = DistanceFormat::Half;
     uint32_t max_bricks = 1u << 17;  ///< of all levels; the least important go when they are too many
     int workers = 0;                 ///< 0: all cores

@@ -8,6 +8,7 @@
 #include "scene/read_values.h"
 
 #include "base/format.h"
+#include "field/levels.gpu.h"
 
 #include <bit>
 #include <cmath>
@@ -53,6 +54,9 @@ private:
             if (!std::has_single_bit(uint32_t(f.cells)))
                 return in_.fail(
                     *v, formatted("{} is not a power of two; use {}", f.cells, std::bit_floor(uint32_t(f.cells))));
+            if (f.levels > 1 && (f.cells < field::kFewestLevelCells || f.cells > field::kMostLevelCells))
+                return in_.fail(*v, formatted("{} cells a side; several levels have {} to {} each", f.cells,
+                                              field::kFewestLevelCells, field::kMostLevelCells));
         }
         if (const auto v = doc_.find(*at, "distance_8bit")) f.distance_8bit = doc_.is(*v, JsonType::True);
         if (const auto v = doc_.find(*at, "bounds")) {

@@ -92,6 +92,11 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"render potter -o a.png --view nomal", "did you mean normal?"},
         {"render potter -o a.png --unpruned", "--analytic"},
         {"render potter -o a.png --frobnicate", "--help"},
+        {"render potter -o a.png --path all", "--frames"},
+        {"render potter -o a.png --frames 9", "--path"},
+        {"render potter -o a.png --path all --frames 2 --camera main", "leave --camera"},
+        {"render potter -o a.png --path main,maim --frames 2 --size 8x8", "did you mean \"main\"?"},
+        {"render potter -o a.png --path main --frames 2 --size 8x8", "two cameras"},
         {"render potter -o a.png --camera maim --size 8x8", "did you mean \"main\"?"},
         {"demo potte", "did you mean potter?"},
         {"query potter", "--points"},
@@ -291,8 +296,28 @@ TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
 TEST_F(Cli, DemoListsScenes) {
     const Outcome o = run("demo --list");
     EXPECT_EQ(o.code, 0);
-    for (const char* name : {"orbit", "potter", "quarry"}) EXPECT_THAT(o.out, HasSubstr(name));
-    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 3);
+    for (const char* name : {"archipelago", "orbit", "potter", "quarry"}) EXPECT_THAT(o.out, HasSubstr(name));
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 4);
+}
+
+TEST_F(Cli, APathIsASequenceAndLevelsFollowIt) {
+    write("way.kiln.json",
+          "{\"format\": 1, \"field\": {\"voxel_size\": 0.05, \"levels\": 3, \"cells\": 32},"
+          "\"edits\": [{\"shape\": \"plane\"}, {\"shape\": \"sphere\", \"radius\": 1}],"
+          "\"cameras\": {\"a\": {\"position\": [0, 2, 6], \"target\": [0, 0, 0]}, \"b\": {\"position\": [9, 2, 6], "
+          "\"target\": "
+          "[5, 0, 0]}}}");
+    const Outcome o = run("render way.kiln.json -o way.png --path a,b --frames 3 --size 32x18 --budget 400 --json -q");
+    if (o.code == 4) GTEST_SKIP() << o.err;
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(files(), testing::ElementsAre("way.kiln.json", "way_0000.png", "way_0001.png", "way_0002.png"));
+    for (const char* key : {"\"frames\"", "\"bake_ms\"", "\"levels\"", "\"queued\"", "\"evicted\"", "\"refused\""})
+        EXPECT_THAT(o.out, HasSubstr(key));
+    write("few.kiln.json", "{\"format\": 1, \"field\": {\"levels\": 3, \"cells\": 16}, \"edits\": []}");
+    const Outcome few = run("render few.kiln.json -o few.png");
+    EXPECT_EQ(few.code, 3);
+    EXPECT_THAT(few.err, HasSubstr("few.kiln.json:1:"));
+    EXPECT_THAT(few.err, HasSubstr("field.cells: 16 cells a side; several levels have 32 to 128 each"));
 }
 
 TEST_F(Cli, ReferenceNeedsNoDevice) {

@@ -631,7 +631,7 @@ TEST(Clipmap, RefusesSettingsThatMakeNoSense) {
     const auto program = worlds::compiled(country(1));
     for (const ClipmapOptions& bad :
          {ClipmapOptions{.voxel_size = 0}, ClipmapOptions{.levels = 0}, ClipmapOptions{.levels = 17},
-          ClipmapOptions{.cells = 48}, ClipmapOptions{.cells = 16}, ClipmapOptions{.cells = 512}}) {
+          ClipmapOptions{.cells = 48}, ClipmapOptions{.cells = 16}, ClipmapOptions{.cells = 256}}) {
         auto map = Clipmap::make(program, bad, {});
         ASSERT_FALSE(map);
         EXPECT_EQ(map.error().kind, ErrorKind::Usage);

