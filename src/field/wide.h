@@ -7,22 +7,38 @@
 #include "field/cubic.gpu.h"
 #include "sdf/eval.h"
 
+#include <array>
 #include <cstddef>
 
 namespace kiln::field {
 
-/// Which voxels of a brick have a solid corner, so that a surface may be in them: byte z * 8 + y, bit x.
-inline constexpr int kSolidMaskBytes = 64;
-void solid_mask(const std::byte* texels, int texel_bytes, std::byte* out);
+/// What the wide loops know of a cell, in one word: where to read texels (always somewhere), and what the cell word says. By cell_word_index().
+using WideEntry = uint64_t;
+using WidePage = std::array<WideEntry, kCellPage * kCellPage * kCellPage>;
+inline constexpr WideEntry kWideOccupied = 1ull << 63;
+inline constexpr WideEntry kWideInside = 1ull << 62;
+inline constexpr WideEntry kWideSolid = 1ull << 61;  // occupied, and some texel is solid: rays look at no other bricks
+inline constexpr int kWideJumpShift = 48;            // three bits
+inline constexpr WideEntry kWideAddress = (1ull << kWideJumpShift) - 1;
 
-/// Where the wide loops find a field: what they gather from. Lives as long as the bricks it was made of.
+WideEntry wide_entry_of_brick(const std::byte* codes, bool solid);
+/// Of an empty cell's word.
+WideEntry wide_entry_of_empty(uint32_t word);
+/// Codes of no brick, to read where there is none.
+const std::byte* wide_no_texels();
+
+/// Where the wide loops find a field. Lives as long as the pages and bricks it was made of.
 struct WideView {
     GridParams grid{};
-    const uint32_t* cells = nullptr;           ///< cell words by index in the grid
-    const std::byte* const* bricks = nullptr;  ///< codes by slot, of at least one
-    int texel_bytes = 2;                       ///< 2: half_code(), 1: snorm8_code()
-    const std::byte* solid =
-        nullptr;  ///< solid_mask() of slot s at s * kSolidMaskBytes, three more bytes at the end; rays only
+    const WidePage* const* pages = nullptr;  ///< never null, by page of cells
+    int pages_x = 0, pages_y = 0;
+    int texel_bytes = 2;  ///< 2: half_code(), 1: snorm8_code()
+    // For one point: voxels a metre; first and past-the-last texel by axis, the fourth always holds 0.
+    float inverse_voxel = 1;
+    alignas(16) std::array<float, 4> low{}, high{};
+
+    WideView() = default;
+    WideView(const GridParams& grid, const WidePage* const* pages, int pages_x, int pages_y, int texel_bytes);
 };
 
 /// Rays in texels, as arrays: TexelRay's fields without `inverse`, and how far each goes (voxels).
@@ -35,9 +51,10 @@ struct WideRays {
 
 /// out[i] = distance at point i, metres. See HostBricks::distances().
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa);
-/// The same for one point: three axes in step instead of many points, and no branch on where the point is.
+/// The same for one point: three axes in step instead of many points, and no branch on what is there.
 float wide_distance(const WideView& view, vec3 p);
-/// hits[i] = field_march(ray i, 0, t_max), but for the counters `cells` and `voxels`, which stay 0.
+/// hits[i] = field_march(ray i, 0, t_max), but for `slot` (whether there is one: the caller knows it from the cell) and the counters
+/// `cells` and `voxels`, which stay 0.
 void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, sdf::Isa isa);
 
 }  // namespace kiln::field

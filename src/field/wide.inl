@@ -18,6 +18,9 @@ static inline I min(I a, I b) { return select(lt(b, a), b, a); }
 static inline I max(I a, I b) { return select(lt(a, b), b, a); }
 static inline M ge0(I v) { return without(all(), lt(v, splat(0))); }
 
+static inline F3 select(M m, F3 a, F3 b) { return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)}; }
+static inline I3 select(M m, I3 a, I3 b) { return {select(m, a.x, b.x), select(m, a.y, b.y), select(m, a.z, b.z)}; }
+
 static inline F load(const float* from) {
     F v;
     std::memcpy(&v, from, sizeof v);
@@ -72,7 +75,26 @@ static inline F trilinear(const WideCorners& c, F3 p) {
 }
 
 static inline I texel_of(I3 voxel) { return (voxel.z * 8 + voxel.y) * 8 + voxel.x; }
-static inline I cell_index(const GridParams& g, I3 cell) { return (cell.z * g.size_y + cell.y) * g.size_x + cell.x; }
+
+// ---- cells
+
+// Flags of an entry (wide.h), as they stand in its upper half.
+constexpr int32_t kInsideFlag = int32_t(kWideInside >> 32), kSolidFlag = int32_t(kWideSolid >> 32);
+static inline M is_occupied(I flags) { return lt(flags, splat(0)); }
+static inline I jump_of(I flags) { return (flags >> (kWideJumpShift - 32)) & 7; }
+static inline M has(I flags, int32_t flag) { return eq(flags & flag, splat(flag)); }
+
+// Where cells of the grid have their entries: which page, which of its words.
+struct CellPlace {
+    I page, word;
+};
+static inline CellPlace cell_place(const WideView& view, I3 cell) {
+    return {((cell.z >> 3) * view.pages_y + (cell.y >> 3)) * view.pages_x + (cell.x >> 3),
+            ((cell.z & 7) * 8 + (cell.y & 7)) * 8 + (cell.x & 7)};
+}
+static inline Pointers entries_of(const WideView& view, const CellPlace& at, I& flags) {
+    return gather_entries(moved(gather_pages(view.pages, at.page), at.word * int32_t(sizeof(WideEntry))), flags);
+}
 
 // ---- points
 
@@ -81,65 +103,121 @@ struct Place {
     F cell, voxel, part;
     M inside;
 };
-static inline Place place_of(F p, F inverse_voxel, int first_cell, int cells) {
+static inline Place place_of(F p, F inverse_voxel, float first_texel, float past_texel) {
     const F q = p * inverse_voxel;
     const F down = floor(q);
-    const F texel = down - float(first_cell * kBrickVoxels);
+    const F texel = down - first_texel;
     const F cell = floor((texel + 0.5f) * (1.0f / 7.0f));  // right for grids of fewer than 2^22 texels an axis
-    const M inside = both(le(number(0), texel), lt(texel, number(float(cells * kBrickVoxels))));
+    const M inside = both(le(number(first_texel), down), lt(down, number(past_texel)));
     return {cell, texel - cell * 7.0f, q - down, inside};
 }
 
-// Points whose texels are on their way from memory.
+// A packet of points.
 struct Located {
-    Pointers brick;  // of some brick where there is none
-    I texel;
-    M inside, occupied;
-    F3 part;
-    F empty;  // the answer where there is no brick, voxels
-};
+    Place x, y, z;
+    M inside;
+    CellPlace cell;  // of the grid's first cell for points outside the grid
 
-static inline void locate(const WideView& view, F3 p, Located& out) {
-    const GridParams& g = view.grid;
-    const F inverse = number(1.0f / g.voxel_size);
-    const Place x = place_of(p.x, inverse, g.cell_x, g.size_x), y = place_of(p.y, inverse, g.cell_y, g.size_y),
-                z = place_of(p.z, inverse, g.cell_z, g.size_z);
-    out.inside = both(both(x.inside, y.inside), z.inside);
-    const auto held = [&](F cell) { return select(out.inside, to_int(cell), splat(0)); };  // before they are multiplied
-    const I index = cell_index(g, {held(x.cell), held(y.cell), held(z.cell)});
-    const I word = gather(view.cells, index);
-    out.occupied = both(out.inside, lt(word, splat(0)));
-    out.brick = gather_pointers(view.bricks, select(out.occupied, word & int32_t(kCellSlotMask), splat(0)));
-    out.texel = select(out.occupied, to_int((z.voxel * 8.0f + y.voxel) * 8.0f + x.voxel), splat(0));
-    out.part = {x.part, y.part, z.part};
-    out.empty = number(0);
-    const M empty = without(out.inside, out.occupied);
-    if (any(empty)) {
+    Located(const WideView& view, F3 p) {
+        const F inverse = number(view.inverse_voxel);
+        x = place_of(p.x, inverse, view.low[0], view.high[0]);
+        y = place_of(p.y, inverse, view.low[1], view.high[1]);
+        z = place_of(p.z, inverse, view.low[2], view.high[2]);
+        inside = both(both(x.inside, y.inside), z.inside);
+        const auto held = [&](F c) { return select(inside, to_int(c), splat(0)); };  // before they are multiplied
+        cell = cell_place(view, {held(x.cell), held(y.cell), held(z.cell)});
+    }
+    I row() const { return to_int(y.voxel * 8.0f + x.voxel); }
+    F3 part() const { return {x.part, y.part, z.part}; }
+    // The answer where there is no brick, voxels.
+    F empty(I flags) const {
         // Every cell nearer than the jump is empty too.
         const auto to_face = [](const Place& a) {
             const F at = a.voxel + a.part;
             return min(at, 7.0f - at);
         };
-        const I jump = word & 7;
+        const I jump = jump_of(flags);
         const F free = to_float(jump - 1) * 7.0f + min(min(to_face(x), to_face(y)), to_face(z));
         const F size = select(eq(jump, splat(0)), number(0), free);
-        const M solid = eq(word & int32_t(kCellInside), splat(int32_t(kCellInside)));
-        out.empty = select(empty, select(solid, -size, size), out.empty);
+        return select(inside, select(has(flags, kInsideFlag), -size, size), number(0));
     }
+};
+
+// Points whose texels are on their way from memory.
+struct Waiting {
+    Pointers brick;  // of some texels where there is no brick
+    I texel;
+    M occupied;
+    F3 part;
+    F empty;
+    int at;  // in the list
+};
+
+static inline void wait_for(const WideView& view, const Located& p, Waiting& out) {
+    I flags;
+    out.brick = entries_of(view, p.cell, flags);
+    out.occupied = both(p.inside, is_occupied(flags));
+    out.texel = select(out.occupied, to_int(p.z.voxel) * 64 + p.row(), splat(0));
+    out.part = p.part();
+    out.empty = number(0);
+    if (any(without(p.inside, out.occupied))) out.empty = p.empty(flags);
 }
 
 template <bool Half>
-static inline void answer(const WideView& view, const Located& at, float* out) {
-    F d = at.empty;
-    if (any(at.occupied)) d = select(at.occupied, trilinear(corners_at<Half>(at.brick, at.texel), at.part), d);
-    d = d * view.grid.voxel_size;
-    std::memcpy(out, &d, sizeof d);
+static inline F answer(const Waiting& at) {
+    if (!any(at.occupied)) return at.empty;
+    return select(at.occupied, trilinear(corners_at<Half>(at.brick, at.texel), at.part), at.empty);
 }
+
+#ifdef KILN_WIDE_SLICES
+// Neighbours that lie in one or two cells, as points do that are asked in the order of space: no texel is gathered, each slice of
+// voxels is read once. False where they lie in more.
+template <bool Half>
+static inline bool answer_by_slices(const WideView& view, const Located& p, F& out) {
+    const I index = p.cell.page * int32_t(std::tuple_size_v<WidePage>) + p.cell.word;
+    const M first = eq(index, splat(index[0])), others = without(all(), first);
+    if (any(without(all(), p.inside)) || any(without(others, eq(index, splat(index[kLanes - 1]))))) return false;
+    int32_t slices[kLanes];
+    const I slice = to_int(p.z.voxel);
+    std::memcpy(slices, &slice, sizeof slices);
+    const Words texel = pair_of(p.row());
+    Words v00{}, v10{}, v01{}, v11{};
+    I flags = splat(0);
+    const auto look = [&](M lanes, int one) {
+        const WideEntry entry = (*view.pages[p.cell.page[one]])[size_t(p.cell.word[one])];
+        flags = select(lanes, splat(int32_t(entry >> 32)), flags);
+        if ((entry & kWideOccupied) == 0) return;
+        const std::byte* const brick = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
+        do {
+            const int z = slices[__builtin_ctz(bits(lanes))];
+            const M here = both(lanes, eq(slice, splat(z)));
+            const std::byte* const codes = brick + z * (Half ? 128 : 64);
+            const SliceTable near = slice_table<Half>(codes), far = slice_table<Half>(codes + (Half ? 128 : 64));
+            v00 = looked_up(near, texel, 0, here, v00);
+            v10 = looked_up(near, texel, 8, here, v10);
+            v01 = looked_up(far, texel, 0, here, v01);
+            v11 = looked_up(far, texel, 8, here, v11);
+            lanes = without(lanes, here);
+        } while (any(lanes));
+    };
+    look(first, 0);
+    if (any(others)) look(others, kLanes - 1);
+    WideCorners corners;
+    values_of<Half>(v00, corners.v00.a, corners.v00.b);
+    values_of<Half>(v10, corners.v10.a, corners.v10.b);
+    values_of<Half>(v01, corners.v01.a, corners.v01.b);
+    values_of<Half>(v11, corners.v11.a, corners.v11.b);
+    out = trilinear(corners, p.part());
+    const M occupied = is_occupied(flags);
+    if (any(without(all(), occupied))) out = select(occupied, out, p.empty(flags));
+    return true;
+}
+#endif
 
 template <bool Half>
 static void all_distances(const WideView& view, const sdf::Points& points, float* out) {
     constexpr int kBlock = 128;  // points whose texels are fetched together
-    Located located[kBlock / kLanes];
+    Waiting waiting[kBlock / kLanes];
     for (int at = 0; at < points.count; at += kBlock) {
         const int count = points.count - at < kBlock ? points.count - at : kBlock;
         const float* from[3] = {points.x + at, points.y + at, points.z + at};
@@ -150,9 +228,24 @@ static void all_distances(const WideView& view, const sdf::Points& points, float
                 from[axis] = padded[axis];
             }
         }
-        for (int i = 0; i < kBlock / kLanes; ++i) {
-            locate(view, {load(from[0] + i * kLanes), load(from[1] + i * kLanes), load(from[2] + i * kLanes)}, located[i]);
-            const Pointers texels = moved(located[i].brick, located[i].texel * (Half ? 2 : 1));
+        float* const to = count < kBlock ? answers : out + at;
+        const auto store = [&](int i, F d) {
+            d = d * view.grid.voxel_size;
+            std::memcpy(to + i, &d, sizeof d);
+        };
+        int n = 0;
+        for (int i = 0; i < kBlock; i += kLanes) {
+            const Located p(view, {load(from[0] + i), load(from[1] + i), load(from[2] + i)});
+#ifdef KILN_WIDE_SLICES
+            if (F d; answer_by_slices<Half>(view, p, d)) {
+                store(i, d);
+                continue;
+            }
+#endif
+            Waiting& w = waiting[n++];
+            w.at = i;
+            wait_for(view, p, w);
+            const Pointers texels = moved(w.brick, w.texel * (Half ? 2 : 1));
             const std::byte* rows[kLanes];
             std::memcpy(rows, &texels, sizeof rows);
             for (const std::byte* const row : rows) {
@@ -160,8 +253,7 @@ static void all_distances(const WideView& view, const sdf::Points& points, float
                 __builtin_prefetch(row + 72 * (Half ? 2 : 1));
             }
         }
-        float* const to = count < kBlock ? answers : out + at;
-        for (int i = 0; i < kBlock / kLanes; ++i) answer<Half>(view, located[i], to + i * kLanes);
+        for (int i = 0; i < n; ++i) store(waiting[i].at, answer<Half>(waiting[i]));
         if (count < kBlock) std::memcpy(out + at, answers, sizeof(float) * size_t(count));
     }
 }
@@ -275,23 +367,23 @@ struct Packet {
     M up_x, up_y, up_z;
     M flat_x, flat_y, flat_z;  // parallel to the planes of an axis
 };
+static inline M select_lanes(M m, M a, M b) { return either(both(m, a), without(b, m)); }
+static inline Packet select(M m, const Packet& a, const Packet& b) {
+    return {select(m, a.whole, b.whole),         select(m, a.part, b.part),
+            select(m, a.direction, b.direction), select(m, a.inverse, b.inverse),
+            select_lanes(m, a.up_x, b.up_x),     select_lanes(m, a.up_y, b.up_y),
+            select_lanes(m, a.up_z, b.up_z),     select_lanes(m, a.flat_x, b.flat_x),
+            select_lanes(m, a.flat_y, b.flat_y), select_lanes(m, a.flat_z, b.flat_z)};
+}
 
-// One axis of a packet's way through bricks.
-struct BrickAxis {
-    I stride;      // -1, 1
-    I ahead;       // from a voxel to the plane through which the ray leaves it: 0, 1
-    I last;        // that plane of the last voxel: 0, 7
-    F last_plane;  // pushed out by kFaceOverlap
-
-    explicit BrickAxis(M up)
-        : stride(select(up, splat(1), splat(-1))), ahead(select(up, splat(1), splat(0))),
-          last(select(up, splat(kBrickVoxels), splat(0))),
-          last_plane(select(up, number(float(kBrickVoxels) + kFaceOverlap), number(-kFaceOverlap))) {}
-    F exit_plane(I voxel) const {
-        const I plane = voxel + ahead;
-        return select(eq(plane, last), last_plane, to_float(plane));
-    }
-};
+// The plane through which a ray leaves a voxel, of one axis; the brick's own faces are pushed out by kFaceOverlap.
+static inline F exit_plane(M up, I voxel) {
+    const F last = select(up, number(float(kBrickVoxels) + kFaceOverlap), number(-kFaceOverlap));
+    const I plane = select(up, voxel + 1, voxel);
+    return select(eq(plane, select(up, splat(kBrickVoxels), splat(0))), last, to_float(plane));
+}
+static inline F entry_plane(M up, I voxel) { return exit_plane(without(all(), up), voxel); }
+static inline I stepped(M m, M up, I voxel) { return select(m, voxel + select(up, splat(1), splat(-1)), voxel); }
 
 struct WideBrickRay {
     F3 high, low, lead, rest;
@@ -326,6 +418,10 @@ static inline F coordinate(F from, F high, F low, F lead, F rest, F s) {
     const F small = low + (rest * c + (lead + rest) * (s - c));
     return large + small;
 }
+static inline WideBrickRay select(M m, const WideBrickRay& a, const WideBrickRay& b) {
+    return {select(m, a.high, b.high), select(m, a.low, b.low), select(m, a.lead, b.lead), select(m, a.rest, b.rest),
+            select(m, a.t_base, b.t_base)};
+}
 static inline F3 point_in_voxel(const WideBrickRay& r, I3 voxel, F s) {
     const auto one = [&](I v, F high, F low, F lead, F rest) {
         return min(max(coordinate(to_float(v), high, low, lead, rest, s), number(-kFaceOverlap)), number(1.0f + kFaceOverlap));
@@ -333,132 +429,137 @@ static inline F3 point_in_voxel(const WideBrickRay& r, I3 voxel, F s) {
     return {one(voxel.x, r.high.x, r.low.x, r.lead.x, r.rest.x), one(voxel.y, r.high.y, r.low.y, r.lead.y, r.rest.y),
             one(voxel.z, r.high.z, r.low.z, r.lead.z, r.rest.z)};
 }
-// What the packet's rays have met, by lane.
-struct Met {
-    I state, slot;
-    F t;
-    I3 cell, voxel;
-    F3 p;
-};
-
-// A packet's walk through the voxels of one brick a lane.
-template <bool Half>
-struct BrickWalk {
-    const WideView& view;
-    const Packet& packet;
-    const WideBrickRay ray;
-    const I slot;
-    const BrickAxis x, y, z;
-    F enter, leave;
-    I3 voxel;
-    M walking;
-
-    // Steps to the next voxel; lanes that leave the brick walk no more.
-    void step(M m) {
-        F out_x, out_y, out_z;
-        const F out_any = exits(out_x, out_y, out_z);
-        const M last = le(leave, out_any);
-        enter = select(m, max(min(out_any, leave), enter), enter);
-        const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x);
-        const M by_z = without(without(all(), by_x), by_y);
-        voxel.x = select(both(m, by_x), voxel.x + x.stride, voxel.x);
-        voxel.y = select(both(m, by_y), voxel.y + y.stride, voxel.y);
-        voxel.z = select(both(m, by_z), voxel.z + z.stride, voxel.z);
-        const M outside = either(lt(min(min(voxel.x, voxel.y), voxel.z), splat(0)),
-                                 lt(splat(kBrickVoxels - 1), max(max(voxel.x, voxel.y), voxel.z)));
-        walking = without(walking, both(m, either(last, outside)));
-    }
-    F exits(F& out_x, F& out_y, F& out_z) const {
-        out_x = crossing(x.exit_plane(voxel.x), ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x, kFarVoxels);
-        out_y = crossing(y.exit_plane(voxel.y), ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y, kFarVoxels);
-        out_z = crossing(z.exit_plane(voxel.z), ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z, kFarVoxels);
-        return min(min(out_x, out_y), out_z);
-    }
-
-    // Walks each lane to its next voxel with a solid corner: the others' eight values are positive, so they hold no root.
-    M candidates() {
-        M found = none();
-        const I first = slot * kSolidMaskBytes;
-        for (M now = walking; any(now); now = without(walking, found)) {
-            const I row = gather_bytes(view.solid, select(now, first + voxel.z * 8 + voxel.y, splat(0)));
-            found = either(found, both(now, eq((row >> voxel.x) & 1, splat(1))));
-            step(without(now, found));
-        }
-        return found;
-    }
-
-    // Lanes with a hit.
-    M run(M m, Met& met) {
-        M hits = none();
-        const Pointers brick = gather_pointers(view.bricks, slot);
-        walking = m;
-        while (true) {
-            const M now = candidates();
-            if (!any(now)) return hits;
-            F out_x, out_y, out_z;
-            const F exit = max(min(exits(out_x, out_y, out_z), leave), enter);
-            const WideCorners corners = corners_at<Half>(brick, select(now, texel_of(voxel), splat(0)));
-            const F root = first_root(cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit)), now);
-            const M hit = both(now, le(root, number(1)));
-            if (any(hit)) {
-                const F s = enter + root * (exit - enter);
-                const F3 p = point_in_voxel(ray, voxel, s);
-                const auto unit = [](F v) { return min(max(v, number(0)), number(1)); };
-                met.t = select(hit, ray.t_base + s, met.t);
-                met.voxel = {select(hit, voxel.x, met.voxel.x), select(hit, voxel.y, met.voxel.y), select(hit, voxel.z, met.voxel.z)};
-                met.p = {select(hit, unit(p.x), met.p.x), select(hit, unit(p.y), met.p.y), select(hit, unit(p.z), met.p.z)};
-                hits = either(hits, hit);
-                walking = without(walking, hit);
-            }
-            step(without(now, hit));
-        }
-    }
-};
-
-template <bool Half>
-static inline M march_in_bricks(const WideView& view, const Packet& packet, I3 cell, I slot, M m, F t_max, Met& met) {
-    const WideBrickRay ray = brick_ray_of(packet, {cell.x * kBrickVoxels, cell.y * kBrickVoxels, cell.z * kBrickVoxels});
-    const F first = number(-kFaceOverlap), last = number(float(kBrickVoxels) + kFaceOverlap);
-    F enter = 0.0f - ray.t_base, leave = t_max - ray.t_base;
-    const auto clip = [&](M up, F high, F low, F inverse, M flat) {
-        enter = max(enter, crossing(select(up, first, last), high, low, inverse, flat, -kFarVoxels));
-        leave = min(leave, crossing(select(up, last, first), high, low, inverse, flat, kFarVoxels));
-    };
-    clip(packet.up_x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
-    clip(packet.up_y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
-    clip(packet.up_z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
-    const auto voxel_of = [&](F high, F low, F lead, F rest) {
-        return to_int(min(max(coordinate(number(0), high, low, lead, rest, enter), number(0)), number(6.5f)));
-    };
-    BrickWalk<Half> walk{view,
-                   packet,
-                   ray,
-                   select(m, slot, splat(0)),
-                   BrickAxis(packet.up_x),
-                   BrickAxis(packet.up_y),
-                   BrickAxis(packet.up_z),
-                   enter,
-                   leave,
-                   {voxel_of(ray.high.x, ray.low.x, ray.lead.x, ray.rest.x), voxel_of(ray.high.y, ray.low.y, ray.lead.y, ray.rest.y),
-                    voxel_of(ray.high.z, ray.low.z, ray.lead.z, ray.rest.z)},
-                   none()};
-    return walk.run(without(m, lt(leave, enter)), met);
-}
-
 static inline I cell_of(I whole, F part, F direction, F t) {
     return to_int(floor((to_float(whole) + (part + direction * t)) / 7.0f));
 }
 
-// A packet's walk through the cells of the grid.
-struct GridWalk {
-    const GridParams& g;
-    const Packet& packet;
-    F t_max;
-    F t;
-    I3 cell;
+// Rays under way, one a lane. What they have to do next differs: look at the next cell, enter a brick, walk its voxels, solve a voxel's cubic.
+// All that wait for the same do it together, the most first; a lane that is done takes the next ray of the list.
+template <bool Half>
+struct Marching {
+    const WideView& view;
+    const WideRays& list;
+    const int total;
+    MarchHit* const hits;
+    int& next;
+
+    // By lane:
+    I number_in_list{};
+    Packet packet{};
+    F t_max{}, t{};  // t: where the ray has come to, by cells
+    I3 cell{};
+    I reach{};       // cells around that are empty too
+    Pointers brick = same_pointer(wide_no_texels());  // or the last one, so that every lane may read
+    WideBrickRay ray{};
+    F enter{}, leave{};  // from ray.t_base: into the voxel, out of the brick
+    F past{};            // there no voxel with a solid corner comes any more
+    I3 voxel{};
+    M looking = none(), entering = none(), walking = none(), solving = none();
+    M stepping = none();  // of those looking: not at the cell where they are, but at the next
+
+    // Does what most lanes wait for; false when there is nothing left to do.
+    bool turn() {
+        constexpr int kSpare = kLanes / 4;  // lanes that wait for new rays
+        const int look = count(looking), in = count(entering), walk = count(walking), solve = count(solving);
+        const int busy = look + in + walk + solve;
+        if (next < total && kLanes - busy >= kSpare) {
+            take();
+        } else if (busy == 0) {
+            return false;
+        } else if (solve >= max_of(look, in, walk)) {
+            solve_voxels();
+        } else if (in >= max_of(look, walk, 0)) {
+            enter_bricks();
+        } else if (walk >= look) {
+            walk_voxels();
+        } else {
+            look_at_cells();
+        }
+        return true;
+    }
+    static int max_of(int a, int b, int c) { return std::max(std::max(a, b), c); }
+
+    // Gives the next rays to free lanes.
+    void take() {
+        const M free = without(all(), either(either(looking, entering), either(walking, solving)));
+        int32_t whole[3][kLanes] = {}, order[kLanes] = {}, taken[kLanes] = {};
+        float part[3][kLanes] = {}, direction[3][kLanes] = {}, far[kLanes] = {};
+        for (uint32_t left = bits(free); left != 0 && next < total; left &= left - 1, ++next) {
+            const int lane = __builtin_ctz(left);
+            for (int axis = 0; axis < 3; ++axis) {
+                whole[axis][lane] = list.whole[axis][next];
+                part[axis][lane] = list.part[axis][next];
+                direction[axis][lane] = list.direction[axis][next];
+            }
+            far[lane] = list.t_max[next];
+            order[lane] = next;
+            taken[lane] = -1;
+        }
+        const M fresh = lt(load(taken), splat(0));
+        const auto component = [](F d) { return select(lt(abs(d), number(1e-12f)), number(0), d); };
+        const auto inverse = [](F d) { return select(eq(d, number(0)), number(0), 1.0f / d); };
+        Packet p;
+        p.whole = {load(whole[0]) - view.grid.cell_x * kBrickVoxels, load(whole[1]) - view.grid.cell_y * kBrickVoxels,
+                   load(whole[2]) - view.grid.cell_z * kBrickVoxels};
+        p.part = {load(part[0]), load(part[1]), load(part[2])};
+        p.direction = {component(load(direction[0])), component(load(direction[1])), component(load(direction[2]))};
+        p.inverse = {inverse(p.direction.x), inverse(p.direction.y), inverse(p.direction.z)};
+        p.flat_x = eq(p.inverse.x, number(0));
+        p.flat_y = eq(p.inverse.y, number(0));
+        p.flat_z = eq(p.inverse.z, number(0));
+        p.up_x = lt(number(0), p.inverse.x);
+        p.up_y = lt(number(0), p.inverse.y);
+        p.up_z = lt(number(0), p.inverse.z);
+        packet = select(fresh, p, packet);
+        number_in_list = select(fresh, load(order), number_in_list);
+        t_max = select(fresh, load(far), t_max);
+
+        // Into the grid.
+        const GridParams& g = view.grid;
+        F from = number(0), end = t_max;
+        const auto clip = [&](M up, int cells, I whole_texel, F in_texel, F inverse_direction, M flat) {
+            const I wide = splat(cells * kBrickVoxels);
+            from = max(from, texel_crossing(select(up, splat(0), wide), whole_texel, in_texel, inverse_direction, flat, -kFarVoxels));
+            end = min(end, texel_crossing(select(up, wide, splat(0)), whole_texel, in_texel, inverse_direction, flat, kFarVoxels));
+        };
+        clip(packet.up_x, g.size_x, packet.whole.x, packet.part.x, packet.inverse.x, packet.flat_x);
+        clip(packet.up_y, g.size_y, packet.whole.y, packet.part.y, packet.inverse.y, packet.flat_y);
+        clip(packet.up_z, g.size_z, packet.whole.z, packet.part.z, packet.inverse.z, packet.flat_z);
+        M in = both(fresh, le(from, end));
+        t = select(in, from, t);
+        const auto enter_axis = [&](I& c, I whole_texel, F in_texel, F along, int size) {
+            const I first = select(in, cell_of(whole_texel, in_texel, along, t), splat(0));
+            const M outside = either(lt(first, splat(0)), lt(splat(size - 1), first));
+            in = without(in, both(eq(along, number(0)), outside));
+            c = select(in, min(max(first, splat(0)), splat(size - 1)), c);  // on the other axes rounding may have put it just outside
+        };
+        enter_axis(cell.x, packet.whole.x, packet.part.x, packet.direction.x, g.size_x);
+        enter_axis(cell.y, packet.whole.y, packet.part.y, packet.direction.y, g.size_y);
+        enter_axis(cell.z, packet.whole.z, packet.part.z, packet.direction.z, g.size_z);
+        looking = either(looking, in);
+        stepping = without(stepping, in);
+    }
+
+    void look_at_cells() {
+        looking = without(looking, without(both(looking, stepping), step_cells(both(looking, stepping))));
+        const CellPlace at = cell_place(view, cell);
+        I flags;
+        const Pointers found = entries_of(view, {select(looking, at.page, splat(0)), select(looking, at.word, splat(0))}, flags);
+        const M arrived = both(looking, has(flags, kSolidFlag));
+        brick = select(arrived, found, brick);
+        entering = either(entering, arrived);
+        looking = without(looking, arrived);
+        const M inside = both(looking, has(flags, kInsideFlag));
+        if (any(inside)) {
+            write(inside, kMarchInside, t, {splat(0), splat(0), splat(0)}, {number(0), number(0), number(0)});
+            looking = without(looking, inside);
+        }
+        reach = max(jump_of(flags) - 1, splat(0));  // of an occupied cell 0; that of lanes elsewhere is set when they come back
+        stepping = looking;
+    }
 
     // Leaves the cube of empty cells around each lane's; answers the lanes that are in the grid still.
-    M step(M m, I reach) {
+    M step_cells(M m) {
         const auto border = [&](M up, I c) { return select(up, c + reach + 1, c - reach); };
         const I border_x = border(packet.up_x, cell.x), border_y = border(packet.up_y, cell.y),
                 border_z = border(packet.up_z, cell.z);
@@ -482,116 +583,178 @@ struct GridWalk {
         leap(cell.x, by_x, packet.up_x, border_x);
         leap(cell.y, by_y, packet.up_y, border_y);
         leap(cell.z, by_z, packet.up_z, border_z);
-        return without(both(m, in_grid()), lt(t_max, t));
+        const GridParams& g = view.grid;
+        const M in_grid = both(ge0(min(min(cell.x, cell.y), cell.z)),
+                               both(both(lt(cell.x, splat(g.size_x)), lt(cell.y, splat(g.size_y))), lt(cell.z, splat(g.size_z))));
+        return without(both(m, in_grid), lt(t_max, t));
     }
-    M in_grid() const {
-        return both(ge0(min(min(cell.x, cell.y), cell.z)),
-                    both(both(lt(cell.x, splat(g.size_x)), lt(cell.y, splat(g.size_y))), lt(cell.z, splat(g.size_z))));
+
+    // Lanes whose brick holds no hit go on to the next cell.
+    void go_on(M m) {
+        reach = select(m, splat(0), reach);
+        stepping = either(stepping, m);
+        looking = either(looking, m);
+    }
+
+    // Each to its first voxel of the box that holds all voxels with a solid corner, as if it had walked there.
+    void enter_bricks() {
+        const M m = entering;
+        entering = none();
+        ray = select(m, brick_ray_of(packet, {cell.x * kBrickVoxels, cell.y * kBrickVoxels, cell.z * kBrickVoxels}), ray);
+        const F first = number(-kFaceOverlap), last = number(float(kBrickVoxels) + kFaceOverlap);
+        F in = 0.0f - ray.t_base, out = t_max - ray.t_base;
+        const auto clip = [&](M up, F high, F low, F inverse, M flat) {
+            in = max(in, crossing(select(up, first, last), high, low, inverse, flat, -kFarVoxels));
+            out = min(out, crossing(select(up, last, first), high, low, inverse, flat, kFarVoxels));
+        };
+        clip(packet.up_x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
+        clip(packet.up_y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
+        clip(packet.up_z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
+
+        const I box = gather_from<-kSolidBoxBeforeCodes>(brick);
+        const auto corner = [&](int shift) { return (box >> shift) & 7; };
+        const I3 low{corner(0), corner(3), corner(6)}, high{corner(9), corner(12), corner(15)};
+        const auto to_box = [&](M up, I from, I to, F h, F l, F inverse, M flat) {
+            return crossing(entry_plane(up, select(up, from, to)), h, l, inverse, flat, -kFarVoxels);
+        };
+        const auto from_box = [&](M up, I from, I to, F h, F l, F inverse, M flat) {
+            return crossing(exit_plane(up, select(up, to, from)), h, l, inverse, flat, kFarVoxels);
+        };
+        const F to_x = to_box(packet.up_x, low.x, high.x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
+        const F to_y = to_box(packet.up_y, low.y, high.y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
+        const F to_z = to_box(packet.up_z, low.z, high.z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
+        const F from_x = from_box(packet.up_x, low.x, high.x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
+        const F from_y = from_box(packet.up_y, low.y, high.y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
+        const F from_z = from_box(packet.up_z, low.z, high.z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
+        const F to_any = max(max(to_x, to_y), to_z), from_any = min(min(from_x, from_y), from_z);
+        const M skips = lt(in, to_any);
+        // A walk ends where it comes to `out`, and one that has not begun may begin there.
+        const M alive = without(without(m, lt(out, in)), both(skips, either(le(out, to_any), lt(from_any, to_any))));
+
+        const auto voxel_of = [&](F h, F l, F lead, F rest, F s) {
+            return to_int(min(max(coordinate(number(0), h, l, lead, rest, s), number(0)), number(6.5f)));
+        };
+        I3 at{voxel_of(ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, in), voxel_of(ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, in),
+              voxel_of(ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, in)};
+        if (any(both(alive, skips))) {
+            // Planes are crossed in the order of their crossings, those of x before those of y before those of z where they are equal: at
+            // `to_any` all crossed before it are behind, and of those crossed right there all up to the last axis that enters the box.
+            const M by_z = eq(to_any, to_z), by_y = either(by_z, eq(to_any, to_y));
+            const auto skip = [&](I& v, M up, M equal_too, F h, F l, F lead, F rest, F inverse, M flat) {
+                const I near = voxel_of(h, l, lead, rest, to_any);  // or next to it
+                const auto crossed = [&](F plane, float parallel) {
+                    const F s = crossing(plane, h, l, inverse, flat, parallel);
+                    return either(lt(s, to_any), both(equal_too, eq(s, to_any)));
+                };
+                const M ahead = crossed(exit_plane(up, near), kFarVoxels);
+                const M behind = without(all(), either(ahead, crossed(entry_plane(up, near), -kFarVoxels)));
+                I there = stepped(ahead, up, near);
+                there = stepped(behind, without(all(), up), there);
+                there = min(max(there, splat(0)), splat(kBrickVoxels - 1));
+                const I furthest = select(up, max(there, v), min(there, v));  // a walk never goes back
+                v = select(skips, furthest, v);
+            };
+            skip(at.x, packet.up_x, all(), ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, packet.inverse.x, packet.flat_x);
+            skip(at.y, packet.up_y, by_y, ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, packet.inverse.y, packet.flat_y);
+            skip(at.z, packet.up_z, by_z, ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, packet.inverse.z, packet.flat_z);
+        }
+        voxel = select(m, at, voxel);
+        enter = select(m, select(skips, to_any, in), enter);
+        leave = select(m, out, leave);
+        past = select(m, from_any, past);
+        walking = either(walking, alive);
+        go_on(without(m, alive));
+    }
+
+    F exits(F& out_x, F& out_y, F& out_z) const {
+        out_x = crossing(exit_plane(packet.up_x, voxel.x), ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x, kFarVoxels);
+        out_y = crossing(exit_plane(packet.up_y, voxel.y), ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y, kFarVoxels);
+        out_z = crossing(exit_plane(packet.up_z, voxel.z), ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z, kFarVoxels);
+        return min(min(out_x, out_y), out_z);
+    }
+    // To the next voxel; answers the lanes that are in the brick still.
+    M step_voxels(M m, F out_any, F out_x, F out_y) {
+        enter = select(m, max(min(out_any, leave), enter), enter);
+        const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x);
+        const M by_z = without(without(all(), by_x), by_y);
+        voxel.x = stepped(both(m, by_x), packet.up_x, voxel.x);
+        voxel.y = stepped(both(m, by_y), packet.up_y, voxel.y);
+        voxel.z = stepped(both(m, by_z), packet.up_z, voxel.z);
+        const M outside = either(lt(min(min(voxel.x, voxel.y), voxel.z), splat(0)),
+                                 lt(splat(kBrickVoxels - 1), max(max(voxel.x, voxel.y), voxel.z)));
+        return without(m, either(le(leave, out_any), outside));
+    }
+
+    // Past a voxel without a solid corner, whose eight values are positive: it holds no root. Others wait to be solved.
+    void walk_voxels() {
+        F out_x, out_y, out_z;
+        const F out_any = exits(out_x, out_y, out_z);
+        const M here = without(walking, lt(past, out_any));
+        const I row = gather_from<-kSolidRowsBeforeCodes>(moved(brick, select(here, voxel.z * 8 + voxel.y, splat(0))));
+        const M found = both(here, eq((row >> (voxel.x & 7)) & 1, splat(1)));
+        solving = either(solving, found);
+        const M still = step_voxels(without(here, found), out_any, out_x, out_y);
+        go_on(without(without(walking, found), still));
+        walking = still;
+    }
+
+    void solve_voxels() {
+        const M m = solving;
+        solving = none();
+        F out_x, out_y, out_z;
+        const F out_any = exits(out_x, out_y, out_z);
+        const F exit = max(min(out_any, leave), enter);
+        const WideCorners corners = corners_at<Half>(brick, select(m, texel_of(voxel), splat(0)));
+        const F root = first_root(cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit)), m);
+        const M hit = both(m, le(root, number(1)));
+        if (any(hit)) {
+            const F s = enter + root * (exit - enter);
+            const F3 p = point_in_voxel(ray, voxel, s);
+            const auto unit = [](F v) { return min(max(v, number(0)), number(1)); };
+            write(hit, kMarchHit, ray.t_base + s, voxel, {unit(p.x), unit(p.y), unit(p.z)});
+        }
+        const M missed = without(m, hit);
+        const M still = step_voxels(missed, out_any, out_x, out_y);
+        walking = either(walking, still);
+        go_on(without(missed, still));
+    }
+
+    void write(M m, int state, F at, I3 in_voxel, F3 p) const {
+        for (uint32_t left = bits(m); left != 0; left &= left - 1) {
+            const int lane = __builtin_ctz(left);
+            MarchHit& hit = hits[number_in_list[lane]];
+            hit.state = state;
+            hit.t = at[lane];
+            hit.slot = state == kMarchHit ? 0 : -1;
+            hit.cell = {cell.x[lane] + view.grid.cell_x, cell.y[lane] + view.grid.cell_y, cell.z[lane] + view.grid.cell_z};
+            hit.voxel = {in_voxel.x[lane], in_voxel.y[lane], in_voxel.z[lane]};
+            hit.p = {p.x[lane], p.y[lane], p.z[lane]};
+        }
     }
 };
 
+// Two packets take turns: what one does waits for reads and long sums, in which the processor does the other's.
 template <bool Half>
-static void march_packet(const WideView& view, const Packet& packet, M active, F t_max, Met& met) {
-    const GridParams& g = view.grid;
-    const I wide_x = splat(g.size_x * kBrickVoxels), wide_y = splat(g.size_y * kBrickVoxels), wide_z = splat(g.size_z * kBrickVoxels);
-    F t = number(0), end = t_max;
-    const auto clip = [&](M up, I wide, I whole, F part, F inverse, M flat) {
-        t = max(t, texel_crossing(select(up, splat(0), wide), whole, part, inverse, flat, -kFarVoxels));
-        end = min(end, texel_crossing(select(up, wide, splat(0)), whole, part, inverse, flat, kFarVoxels));
-    };
-    clip(packet.up_x, wide_x, packet.whole.x, packet.part.x, packet.inverse.x, packet.flat_x);
-    clip(packet.up_y, wide_y, packet.whole.y, packet.part.y, packet.inverse.y, packet.flat_y);
-    clip(packet.up_z, wide_z, packet.whole.z, packet.part.z, packet.inverse.z, packet.flat_z);
-    active = both(active, le(t, end));
-    if (!any(active)) return;
-    GridWalk walk{g, packet, t_max, t, {}};
-    const auto enter = [&](I& cell, I whole, F part, F direction, int size) {
-        cell = select(active, cell_of(whole, part, direction, t), splat(0));
-        const M outside = either(lt(cell, splat(0)), lt(splat(size - 1), cell));
-        active = without(active, both(eq(direction, number(0)), outside));
-        cell = min(max(cell, splat(0)), splat(size - 1));  // on the other axes rounding may have put it just outside
-    };
-    enter(walk.cell.x, packet.whole.x, packet.part.x, packet.direction.x, g.size_x);
-    enter(walk.cell.y, packet.whole.y, packet.part.y, packet.direction.y, g.size_y);
-    enter(walk.cell.z, packet.whole.z, packet.part.z, packet.direction.z, g.size_z);
-    I slot = splat(0);
-    const int most = 2 * (g.size_x + g.size_y + g.size_z + 3);
-    for (int round = 0; any(active) && round < most; ++round) {
-        // Every lane goes to its next brick, so that all walk through voxels together.
-        M in_brick = none();
-        for (M look = active; any(look);) {
-            const I word = gather(view.cells, select(look, cell_index(g, walk.cell), splat(0)));
-            const M occupied = both(look, lt(word, splat(0)));
-            in_brick = either(in_brick, occupied);
-            slot = select(occupied, word & int32_t(kCellSlotMask), slot);
-            const M empty = without(look, occupied);
-            const M solid = both(empty, eq(word & int32_t(kCellInside), splat(int32_t(kCellInside))));
-            if (any(solid)) {
-                met.state = select(solid, splat(kMarchInside), met.state);
-                met.t = select(solid, walk.t, met.t);
-                met.cell = {select(solid, walk.cell.x + g.cell_x, met.cell.x), select(solid, walk.cell.y + g.cell_y, met.cell.y),
-                            select(solid, walk.cell.z + g.cell_z, met.cell.z)};
-                active = without(active, solid);
-            }
-            const M onwards = without(empty, solid);
-            look = walk.step(onwards, max((word & 7) - 1, splat(0)));
-            active = without(active, without(onwards, look));
-        }
-        if (!any(in_brick)) return;
-        const M hit = march_in_bricks<Half>(view, packet, walk.cell, slot, in_brick, t_max, met);
-        met.state = select(hit, splat(kMarchHit), met.state);
-        met.slot = select(hit, slot, met.slot);
-        met.cell = {select(hit, walk.cell.x + g.cell_x, met.cell.x), select(hit, walk.cell.y + g.cell_y, met.cell.y),
-                    select(hit, walk.cell.z + g.cell_z, met.cell.z)};
-        const M onwards = without(in_brick, hit);
-        const M still = walk.step(onwards, splat(0));
-        active = without(active, either(hit, without(onwards, still)));
+static void march_all(const WideView& view, const WideRays& rays, int count, MarchHit* hits) {
+    int next = 0;
+    Marching<Half> one{view, rays, count, hits, next}, other{view, rays, count, hits, next};
+    for (bool more = true; more;) {
+        more = one.turn();
+        more = other.turn() || more;
     }
 }
 
 void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits) {
-    for (int at = 0; at < count; at += kLanes) {
-        const int lanes = count - at < kLanes ? count - at : kLanes;
-        int32_t whole[3][kLanes] = {};
-        float part[3][kLanes] = {}, direction[3][kLanes] = {}, far[kLanes] = {};
-        std::memcpy(far, rays.t_max + at, sizeof(float) * size_t(lanes));
-        for (int axis = 0; axis < 3; ++axis) {
-            std::memcpy(whole[axis], rays.whole[axis] + at, sizeof(int32_t) * size_t(lanes));
-            std::memcpy(part[axis], rays.part[axis] + at, sizeof(float) * size_t(lanes));
-            std::memcpy(direction[axis], rays.direction[axis] + at, sizeof(float) * size_t(lanes));
-        }
-        const auto component = [](F d) { return select(lt(abs(d), number(1e-12f)), number(0), d); };
-        const auto inverse = [](F d) { return select(eq(d, number(0)), number(0), 1.0f / d); };
-        Packet packet;
-        packet.whole = {load(whole[0]) - view.grid.cell_x * kBrickVoxels, load(whole[1]) - view.grid.cell_y * kBrickVoxels,
-                        load(whole[2]) - view.grid.cell_z * kBrickVoxels};
-        packet.part = {load(part[0]), load(part[1]), load(part[2])};
-        packet.direction = {component(load(direction[0])), component(load(direction[1])), component(load(direction[2]))};
-        packet.inverse = {inverse(packet.direction.x), inverse(packet.direction.y), inverse(packet.direction.z)};
-        packet.flat_x = eq(packet.inverse.x, number(0));
-        packet.flat_y = eq(packet.inverse.y, number(0));
-        packet.flat_z = eq(packet.inverse.z, number(0));
-        packet.up_x = lt(number(0), packet.inverse.x);
-        packet.up_y = lt(number(0), packet.inverse.y);
-        packet.up_z = lt(number(0), packet.inverse.z);
-        const I lane_numbers = [] {
-            I v;
-            for (int lane = 0; lane < kLanes; ++lane) v[lane] = lane;
-            return v;
-        }();
-        const F t_max = load(far);
-        Met met{splat(kMarchMiss), splat(-1), t_max, {splat(0), splat(0), splat(0)}, {splat(0), splat(0), splat(0)},
-                {number(0), number(0), number(0)}};
-        (view.texel_bytes == 2 ? march_packet<true> : march_packet<false>)(view, packet, lt(lane_numbers, splat(lanes)), t_max, met);
-        for (int lane = 0; lane < lanes; ++lane) {
-            MarchHit& hit = hits[at + lane];
-            hit.state = met.state[lane];
-            hit.t = met.t[lane];
-            hit.slot = met.slot[lane];
-            hit.cell = {met.cell.x[lane], met.cell.y[lane], met.cell.z[lane]};
-            hit.voxel = {met.voxel.x[lane], met.voxel.y[lane], met.voxel.z[lane]};
-            hit.p = {met.p.x[lane], met.p.y[lane], met.p.z[lane]};
-            hit.cells = hit.voxels = 0;
-        }
+    for (int i = 0; i < count; ++i) {
+        MarchHit miss{};
+        miss.state = kMarchMiss;
+        miss.t = rays.t_max[i];
+        miss.slot = -1;
+        hits[i] = miss;
+    }
+    if (view.texel_bytes == 2) {
+        march_all<true>(view, rays, count, hits);
+    } else {
+        march_all<false>(view, rays, count, hits);
     }
 }

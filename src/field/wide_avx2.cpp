@@ -18,17 +18,22 @@ static inline F min(F a, F b) { return (F)_mm256_min_ps((__m256)b, (__m256)a); }
 static inline F max(F a, F b) { return (F)_mm256_max_ps((__m256)b, (__m256)a); }
 static inline F floor(F a) { return (F)_mm256_floor_ps((__m256)a); }
 static inline F sqrt(F a) { return (F)_mm256_sqrt_ps((__m256)a); }
-static inline I gather(const void* base, I index) {
-    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 4);
-}
-static inline I gather_bytes(const void* base, I index) {
-    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 1);
-}
+static inline uint32_t bits(M m) { return uint32_t(_mm256_movemask_ps((__m256)m)); }
+static inline int count(M m) { return __builtin_popcount(bits(m)); }
 
 struct Pointers {
     __m256i low, high;  // of the first and the last four lanes
 };
-static inline Pointers gather_pointers(const std::byte* const* table, I index) {
+static inline Pointers same_pointer(const std::byte* p) {
+    const __m256i all_of_it = _mm256_set1_epi64x(reinterpret_cast<intptr_t>(p));
+    return {all_of_it, all_of_it};
+}
+static inline Pointers select(M m, const Pointers& a, const Pointers& b) {
+    const __m256i low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)m)),
+                  high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)m, 1));
+    return {_mm256_blendv_epi8(b.low, a.low, low), _mm256_blendv_epi8(b.high, a.high, high)};
+}
+static inline Pointers gather_pages(const WidePage* const* table, I index) {
     const auto* const from = reinterpret_cast<const long long*>(table);
     return {_mm256_i32gather_epi64(from, _mm256_castsi256_si128((__m256i)index), 8),
             _mm256_i32gather_epi64(from, _mm256_extracti128_si256((__m256i)index, 1), 8)};
@@ -36,6 +41,15 @@ static inline Pointers gather_pointers(const std::byte* const* table, I index) {
 static inline Pointers moved(const Pointers& p, I bytes) {
     return {_mm256_add_epi64(p.low, _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)bytes))),
             _mm256_add_epi64(p.high, _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)bytes, 1)))};
+}
+static inline Pointers gather_entries(const Pointers& at, I& flags) {
+    const __m256i low = _mm256_i64gather_epi64(static_cast<const long long*>(nullptr), at.low, 1),
+                  high = _mm256_i64gather_epi64(static_cast<const long long*>(nullptr), at.high, 1);
+    // Odd halves of each 128 bits, then in order.
+    const __m256 odd = _mm256_shuffle_ps(_mm256_castsi256_ps(low), _mm256_castsi256_ps(high), 0xdd);
+    flags = (I)_mm256_permute4x64_epi64(_mm256_castps_si256(odd), 0xd8);
+    const __m256i address = _mm256_set1_epi64x(int64_t(kWideAddress));
+    return {_mm256_and_si256(low, address), _mm256_and_si256(high, address)};
 }
 template <int kBytes>
 static inline I gather_from(const Pointers& p) {

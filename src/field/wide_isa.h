@@ -2,6 +2,7 @@
 // Entry points of each instruction set, and what every wide_*.cpp includes before opening its namespace.
 #pragma once
 
+#include "field/brick_content.h"
 #include "field/codes.gpu.h"
 #include "field/wide.h"
 

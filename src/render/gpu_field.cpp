@@ -398,8 +398,7 @@ Result<void> GpuField::bake_on_host(std::span<const uint32_t> slots) {
             field::BrickEvaluator evaluator(field_->program(), field_->options().voxel_size);
             evaluator.evaluate(field_->code_of(slice[job]), {record.texel_x, record.texel_y, record.texel_z});
             const field::BrickContent brick = evaluator.content(field_->options().format);
-            const auto* const from = brick.half ? reinterpret_cast<const std::byte*>(brick.half->data())
-                                                : reinterpret_cast<const std::byte*>(brick.bytes->data());
+            const std::byte* const from = brick.codes();
             for (size_t row = 0; row < 64; ++row) {
                 std::memcpy(codes.data() + packed_at(job, row, 8 * code_bytes), from + row * 8 * code_bytes,
                             8 * code_bytes);

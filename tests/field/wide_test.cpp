@@ -180,29 +180,6 @@ TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
     for (size_t i = 0; i < rays.size(); ++i) EXPECT_EQ(after[i].t, before[i].t);
 }
 
-TEST(Wide, ASolidMaskNamesTheVoxelsWithASolidCorner) {
-    std::mt19937 random(5);
-    for (const int texel_bytes : {1, 2}) {
-        std::vector<std::byte> texels(size_t(kBrickTexelCount * texel_bytes));
-        std::vector<float> values(kBrickTexelCount);
-        for (size_t i = 0; i < values.size(); ++i) {
-            const float d = random() % 30 == 0 ? -1.0f : random() % 90 == 0 ? 0.0f : 2.0f;
-            const uint32_t code = texel_bytes == 2 ? half_code(d) : snorm8_code(d);
-            std::memcpy(texels.data() + i * size_t(texel_bytes), &code, size_t(texel_bytes));
-            values[i] = d;
-        }
-        std::byte mask[kSolidMaskBytes];
-        solid_mask(texels.data(), texel_bytes, mask);
-        for (int v = 0; v < 343; ++v) {
-            const int x = v % 7, y = v / 7 % 7, z = v / 49;
-            bool solid = false;
-            for (int c = 0; c < 8; ++c)
-                solid = solid || values[size_t(((z + (c >> 2)) * 8 + y + (c >> 1 & 1)) * 8 + x + (c & 1))] <= 0;
-            EXPECT_EQ((int(mask[z * 8 + y]) >> x & 1) != 0, solid) << x << " " << y << " " << z;
-        }
-    }
-}
-
 TEST(Wide, NoBricksAtAllAreNoTrouble) {
     const HostBricks bricks = bricks_of(DistanceFormat::Half, {});
     const Cloud c = cloud();

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: MIT
+#include "field/wide_tables.h"
+
+namespace kiln::field {
+namespace {
+
+constexpr size_t kMostBaked = 1 << 16;  // slots waiting; with more, everything is made anew
+
+// Cells of a page that was never written.
+const WidePage& far_page() {
+    static const WidePage one = [] {
+        WidePage page;
+        page.fill(wide_entry_of_empty(uint32_t(kMaxJump)));
+        return page;
+    }();
+    return one;
+}
+
+WideEntry entry_of(uint32_t word, const BrickContents& contents) {
+    if ((word & kCellOccupied) == 0) return wide_entry_of_empty(word);
+    const BrickContent& brick = contents[word & kCellSlotMask];
+    return wide_entry_of_brick(brick.codes(), brick.solid);
+}
+
+}  // namespace
+
+std::shared_ptr<WideTables> WideTables::after(const std::shared_ptr<WideTables>& before, const MadeBricks& baked) {
+    auto out = std::make_shared<WideTables>();
+    const std::lock_guard lock(before->mutex_);
+    if (before->ready_.load(std::memory_order_relaxed)) {
+        out->base_ = before;
+    } else {
+        out->base_ = before->base_;
+        out->baked_ = before->baked_;
+    }
+    if (!out->base_) return out;
+    for (const auto& [slot, content] : baked) out->baked_.push_back(slot);
+    if (out->baked_.size() > kMostBaked) {
+        out->base_.reset();
+        out->baked_.clear();
+    }
+    return out;
+}
+
+void WideTables::make(const Field& field, const BrickContents& contents) {
+    const std::lock_guard lock(mutex_);
+    if (ready_.load(std::memory_order_relaxed)) return;
+    cells_ = field.cells();
+    if (base_) {
+        pages_ = base_->pages_;
+        top_ = base_->top_;
+        const CellMap before = base_->cells_;
+        base_.reset();  // its pages are this one's alone where nobody else asks them
+        cells_.words().each_other_page(before.words(), [&](size_t page) { change_page(page, before, contents); });
+        for (const uint32_t slot : baked_) change_brick(slot, field, contents);
+        baked_ = {};
+    } else {
+        const size_t pages = cells_.words().pages();
+        pages_.resize_pages(pages);
+        top_.assign(pages, &far_page());
+        for (size_t page = 0; page < pages; ++page) {
+            if (cells_.words().find(page) != nullptr) make_page(page, contents);
+        }
+    }
+    const ivec3 pages = cells_.pages();
+    view_ = WideView(field.grid(), top_.data(), pages.x, pages.y,
+                     field.options().format == DistanceFormat::Half ? 2 : 1);
+    ready_.store(true, std::memory_order_release);
+}
+
+void WideTables::make_page(size_t page, const BrickContents& contents) {
+    const CellMap::Words::Page& words = *cells_.words().find(page);
+    WidePage& out = pages_.write_page(page);
+    for (size_t i = 0; i < out.size(); ++i) out[i] = entry_of(words[i], contents);
+    top_[page] = &out;
+}
+
+void WideTables::change_page(size_t page, const CellMap& before, const BrickContents& contents) {
+    const CellMap::Words::Page* const old = before.words().find(page);
+    const CellMap::Words::Page* const now = cells_.words().find(page);
+    if (now == nullptr) {
+        top_[page] = &far_page();
+        return;
+    }
+    if (old == nullptr) {
+        make_page(page, contents);
+        return;
+    }
+    WidePage& out = pages_.write_page(page);
+    for (size_t i = 0; i < out.size(); ++i) {
+        if ((*old)[i] != (*now)[i]) out[i] = entry_of((*now)[i], contents);
+    }
+    top_[page] = &out;
+}
+
+void WideTables::change_brick(uint32_t slot, const Field& field, const BrickContents& contents) {
+    const BrickRecord& record = field.records()[slot];
+    if (record.code_count == 0) return;  // gone again
+    const GridParams g = field.grid();
+    const size_t index = cells_.index(record.texel_x / kBrickVoxels - g.cell_x, record.texel_y / kBrickVoxels - g.cell_y,
+                                      record.texel_z / kBrickVoxels - g.cell_z);
+    const size_t page = index / Pages::kPageSize;
+    WidePage& out = pages_.write_page(page);
+    out[index % Pages::kPageSize] = entry_of(cells_.words()[index], contents);
+    top_[page] = &out;
+}
+
+}  // namespace kiln::field
