@@ -223,10 +223,10 @@ void HostBricks::distances(const sdf::Points& points, float* out, sdf::Isa isa) 
     wide_distances(wide_view(), points, out, isa);
 }
 
-float HostBricks::distance(vec3 p) const { return wide_distance(wide_view(), p); }
+float HostBricks::distance(vec3 p, sdf::Isa isa) const { return wide_distance(wide_view(), p, isa); }
 
 void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const {
-    constexpr size_t kBlock = 256;
+    constexpr size_t kBlock = 512;
     const WideView& view = wide_view();
     const double h = double(view.grid.voxel_size);
     int32_t whole[3][kBlock];

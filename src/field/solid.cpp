@@ -18,10 +18,9 @@ std::array<Slice, 8> solid_texels(const std::byte* codes, int texel_bytes) {
         Slice empty = 0;
         for (int pair = 0; pair < 4; ++pair) {
             const int block = z * 4 + pair;
-            const __m128i above =
-                texel_bytes == 2
-                    ? _mm_packs_epi16(_mm_cmpgt_epi16(at(2 * block), zero), _mm_cmpgt_epi16(at(2 * block + 1), zero))
-                    : _mm_cmpgt_epi8(at(block), zero);
+            const __m128i above = texel_bytes == 2 ? _mm_packs_epi16(_mm_cmpgt_epi16(at(2 * block), zero),
+                                                                     _mm_cmpgt_epi16(at(2 * block + 1), zero))
+                                                   : _mm_cmpgt_epi8(at(block), zero);
             empty |= Slice(uint32_t(_mm_movemask_epi8(above))) << 16 * pair;
         }
         out[size_t(z)] = ~empty;
@@ -64,7 +63,8 @@ SolidVoxels solid_voxels(const std::array<Slice, 8>& texels) {
     Slice columns = all | all >> 32;
     columns |= columns >> 16;
     columns = (columns | columns >> 8) & 0x7f;
-    out.box = solid_box({std::countr_zero(columns), first_y, first_z}, {63 - std::countl_zero(columns), last_y, last_z});
+    out.box =
+        solid_box({std::countr_zero(columns), first_y, first_z}, {63 - std::countl_zero(columns), last_y, last_z});
     return out;
 }
 

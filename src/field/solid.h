@@ -19,9 +19,9 @@ std::array<Slice, 8> solid_texels(const std::byte* codes, int texel_bytes);
 
 /// The voxels of a brick with a solid corner.
 struct SolidVoxels {
-    static constexpr int kRows = 56;                  // of which 55 mean something, so that four bytes can be read at each
-    alignas(4) std::array<uint8_t, kRows> rows{};     ///< by z * 8 + y: bit x
-    uint32_t box = 0;                                 ///< the smallest box with all of them: solid_box(); 0 where there are none
+    static constexpr int kRows = 56;               // of which 55 mean something, so that four bytes can be read at each
+    alignas(4) std::array<uint8_t, kRows> rows{};  ///< by z * 8 + y: bit x
+    uint32_t box = 0;  ///< the smallest box with all of them: solid_box(); 0 where there are none
 };
 
 /// First and last voxel by axis, 3 bits each: x, y, z of the first, then of the last; and kSolidBox.

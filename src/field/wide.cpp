@@ -6,17 +6,9 @@
 #include "field/wide_isa.h"
 
 #include <algorithm>
-#include <bit>
-#include <immintrin.h>
 
 namespace kiln::field {
 namespace {
-
-typedef float F4 __attribute__((vector_size(16)));
-typedef int32_t I4 __attribute__((vector_size(16)));
-
-F4 to_float(I4 v) { return __builtin_convertvector(v, F4); }
-F4 load(const std::array<float, 4>& v) { return std::bit_cast<F4>(v); }
 
 // Where points and rays without a brick read: what they find is not looked at. Codes begin at 64, as after BrickCodes' own head.
 alignas(64) constexpr std::byte kNoBrick[64 + 2 * kBrickTexelCount] = {};
@@ -25,8 +17,10 @@ WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast
 
 }  // namespace
 
-WideEntry wide_entry_of_brick(const std::byte* codes, bool solid) {
-    return kWideOccupied | (solid ? kWideSolid : 0) | address_of(codes);
+WideEntry wide_entry_of_brick(const std::byte* codes) { return kWideOccupied | address_of(codes); }
+uint8_t wide_way_of(uint32_t word, bool solid) {
+    if ((word & kCellOccupied) != 0) return solid ? kWaySolid : uint8_t(0);
+    return uint8_t(((word & kCellInside) != 0 ? kWayInside : 0) | (std::max(word & 7u, 1u) - 1));
 }
 WideEntry wide_entry_of_empty(uint32_t word) {
     return ((word & kCellInside) != 0 ? kWideInside : 0) | WideEntry(word & 7u) << kWideJumpShift |
@@ -34,11 +28,13 @@ WideEntry wide_entry_of_empty(uint32_t word) {
 }
 const std::byte* wide_no_texels() { return kNoBrick + 64; }
 
-WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y, int bytes)
+WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y,
+                   const uint8_t* first_way, int bytes)
     : grid(g),
       pages(first_page),
       pages_x(along_x),
       pages_y(along_y),
+      ways(first_way),
       texel_bytes(bytes),
       inverse_voxel(1.0f / g.voxel_size) {
     const int cell[3] = {g.cell_x, g.cell_y, g.cell_z}, size[3] = {g.size_x, g.size_y, g.size_z};
@@ -49,59 +45,12 @@ WideView::WideView(const GridParams& g, const WidePage* const* first_page, int a
     high[3] = 1;
 }
 
-float wide_distance(const WideView& view, vec3 p) {
-    // x, y, z and one unused lane; whole numbers in floats, right for grids of fewer than 2^22 texels an axis.
-    const F4 q = F4{p.x, p.y, p.z, 0} * view.inverse_voxel;
-    const F4 low = load(view.low);
-    if (_mm_movemask_ps((__m128)((q >= low) & (q < load(view.high)))) != 15) return 0;
-    const F4 toward_zero = to_float(__builtin_convertvector(q, I4));
-    const F4 down = toward_zero > q ? toward_zero - 1.0f : toward_zero;
-    const F4 part = q - down, texel = down - low;
-    const I4 cell = __builtin_convertvector((texel + 0.5f) * (1.0f / 7.0f), I4);
-    const F4 voxel = texel - to_float(cell) * 7.0f;
-    const I4 at = __builtin_convertvector(voxel, I4);
-    const I4 page = cell >> 3, in_page = cell & 7;
-    const WidePage* const entries = view.pages[(page[2] * view.pages_y + page[1]) * view.pages_x + page[0]];
-    const WideEntry entry = (*entries)[size_t((in_page[2] * 8 + in_page[1]) * 8 + in_page[0])];
-
-    const std::byte* const brick = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-    const size_t row = size_t((at[2] * 8 + at[1]) * 8 + at[0]);
-    F4 a, b;  // values at x and x + 1; lanes by y, then z
-    if (view.texel_bytes == 2) {
-        const auto pair = [brick, row](size_t offset) {
-            int32_t w;
-            std::memcpy(&w, brick + 2 * (row + offset), 4);
-            return w;
-        };
-        const I4 w{pair(0), pair(8), pair(64), pair(72)};
-        constexpr int32_t kKept = int32_t(0x8fffe000);  // as in wide.inl
-        a = (F4)(((w << 16) >> 3) & kKept) * 0x1p112f;
-        b = (F4)((w >> 3) & kKept) * 0x1p112f;
-    } else {
-        const auto value = [brick, row](size_t offset) {
-            return float(std::max(int(int8_t(brick[row + offset])), -127)) * kSnorm8StepVoxels;
-        };
-        a = F4{value(0), value(8), value(64), value(72)};
-        b = F4{value(1), value(9), value(65), value(73)};
-    }
-    const F4 x = a * (1.0f - part[0]) + b * part[0];
-    const F4 near = __builtin_shuffle(x, I4{0, 2, 0, 2}), far = __builtin_shuffle(x, I4{1, 3, 1, 3});
-    const F4 y = near * (1.0f - part[1]) + far * part[1];
-    const float stored = y[0] * (1.0f - part[2]) + y[1] * part[2];
-
-    // Every cell nearer than the jump is empty too. Chosen by masks: which points have a brick is not to be foreseen, and a branch gone wrong
-    // would throw away the reads of the points after this one.
-    const int jump = int(entry >> kWideJumpShift) & 7;
-    const F4 in_cell = voxel + part;
-    const F4 other = 7.0f - in_cell;
-    const F4 to_face = in_cell < other ? in_cell : other;
-    const float nearest = std::min(std::min(to_face[0], to_face[1]), to_face[2]);
-    const uint32_t occupied = uint32_t(int64_t(entry) >> 63);
-    const uint32_t known = uint32_t(-int32_t(jump != 0));
-    const uint32_t inside = uint32_t(entry >> 32) << 1 & 0x80000000u;
-    const uint32_t empty = (std::bit_cast<uint32_t>(float(jump - 1) * 7.0f + nearest) & known) ^ inside;
-    const uint32_t chosen = (std::bit_cast<uint32_t>(stored) & occupied) | (empty & ~occupied);
-    return std::bit_cast<float>(chosen) * view.grid.voxel_size;
+float wide_distance(const WideView& view, vec3 p, sdf::Isa isa) {
+    const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512::distance
+                     : isa == sdf::Isa::Avx2 ? &wide_avx2::distance
+                     : isa == sdf::Isa::Sse4 ? &wide_sse4::distance
+                                             : &wide_scalar::distance;
+    return run(view, p);
 }
 
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa) {
@@ -113,7 +62,7 @@ void wide_distances(const WideView& view, const sdf::Points& points, float* out,
 }
 
 void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, sdf::Isa isa) {
-    const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512::march
+    const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512_rays::march
                      : isa == sdf::Isa::Avx2 ? &wide_avx2::march
                      : isa == sdf::Isa::Sse4 ? &wide_sse4::march
                                              : &wide_scalar::march;

@@ -17,13 +17,20 @@ using WideEntry = uint64_t;
 using WidePage = std::array<WideEntry, kCellPage * kCellPage * kCellPage>;
 inline constexpr WideEntry kWideOccupied = 1ull << 63;
 inline constexpr WideEntry kWideInside = 1ull << 62;
-inline constexpr WideEntry kWideSolid = 1ull << 61;  // occupied, and some texel is solid: rays look at no other bricks
-inline constexpr int kWideJumpShift = 48;            // three bits
+inline constexpr int kWideJumpShift = 48;  // three bits
 inline constexpr WideEntry kWideAddress = (1ull << kWideJumpShift) - 1;
 
-WideEntry wide_entry_of_brick(const std::byte* codes, bool solid);
+WideEntry wide_entry_of_brick(const std::byte* codes);
 /// Of an empty cell's word.
 WideEntry wide_entry_of_empty(uint32_t word);
+
+/// What a ray asks of a cell, in a byte: whether to enter, else how many cells around it are empty too.
+inline constexpr uint8_t kWaySolid = 0x80;   // a brick with some solid texel: rays look at no other bricks
+inline constexpr uint8_t kWayInside = 0x40;  // empty, in solid
+inline constexpr uint8_t kWayReach = 7;
+inline constexpr int kWayPadding = 3;  // bytes behind the last cell's
+uint8_t wide_way_of(uint32_t word, bool solid);
+
 /// Codes of no brick, to read where there is none.
 const std::byte* wide_no_texels();
 
@@ -32,13 +39,15 @@ struct WideView {
     GridParams grid{};
     const WidePage* const* pages = nullptr;  ///< never null, by page of cells
     int pages_x = 0, pages_y = 0;
-    int texel_bytes = 2;  ///< 2: half_code(), 1: snorm8_code()
+    const uint8_t* ways = nullptr;  ///< wide_way_of(), by (z * size_y + y) * size_x + x
+    int texel_bytes = 2;            ///< 2: half_code(), 1: snorm8_code()
     // For one point: voxels a metre; first and past-the-last texel by axis, the fourth always holds 0.
     float inverse_voxel = 1;
     alignas(16) std::array<float, 4> low{}, high{};
 
     WideView() = default;
-    WideView(const GridParams& grid, const WidePage* const* pages, int pages_x, int pages_y, int texel_bytes);
+    WideView(const GridParams& grid, const WidePage* const* pages, int pages_x, int pages_y, const uint8_t* ways,
+             int texel_bytes);
 };
 
 /// Rays in texels, as arrays: TexelRay's fields without `inverse`, and how far each goes (voxels).
@@ -51,8 +60,8 @@ struct WideRays {
 
 /// out[i] = distance at point i, metres. See HostBricks::distances().
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa);
-/// The same for one point: three axes in step instead of many points, and no branch on what is there.
-float wide_distance(const WideView& view, vec3 p);
+/// The same for one point.
+float wide_distance(const WideView& view, vec3 p, sdf::Isa isa);
 /// hits[i] = field_march(ray i, 0, t_max), but for `slot` (whether there is one: the caller knows it from the cell) and the counters
 /// `cells` and `voxels`, which stay 0.
 void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, sdf::Isa isa);

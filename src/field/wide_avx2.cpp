@@ -13,11 +13,16 @@ typedef int32_t I __attribute__((vector_size(32)));
 
 #include "field/wide_masks.inl"
 
+#include "field/wide_vectors.inl"
+
 static inline bool any(M m) { return _mm256_movemask_ps((__m256)m) != 0; }
 static inline F min(F a, F b) { return (F)_mm256_min_ps((__m256)b, (__m256)a); }  // as std::min
 static inline F max(F a, F b) { return (F)_mm256_max_ps((__m256)b, (__m256)a); }
 static inline F floor(F a) { return (F)_mm256_floor_ps((__m256)a); }
 static inline F sqrt(F a) { return (F)_mm256_sqrt_ps((__m256)a); }
+static inline I gather_bytes(const void* base, I index) {
+    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 1);
+}
 static inline uint32_t bits(M m) { return uint32_t(_mm256_movemask_ps((__m256)m)); }
 static inline int count(M m) { return __builtin_popcount(bits(m)); }
 
@@ -57,6 +62,12 @@ static inline I gather_from(const Pointers& p) {
     return (I)_mm256_set_m128i(_mm256_i64gather_epi32(base, p.high, 1), _mm256_i64gather_epi32(base, p.low, 1));
 }
 
-#include "field/wide.inl"
+#include "field/wide_math.inl"
+
+#include "field/wide_points.inl"
+
+#include "field/wide_one.inl"
+
+#include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_avx2

@@ -16,12 +16,6 @@ const WidePage& far_page() {
     return one;
 }
 
-WideEntry entry_of(uint32_t word, const BrickContents& contents) {
-    if ((word & kCellOccupied) == 0) return wide_entry_of_empty(word);
-    const BrickContent& brick = contents[word & kCellSlotMask];
-    return wide_entry_of_brick(brick.codes(), brick.solid);
-}
-
 }  // namespace
 
 std::shared_ptr<WideTables> WideTables::after(const std::shared_ptr<WideTables>& before, const MadeBricks& baked) {
@@ -49,6 +43,7 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
     if (base_) {
         pages_ = base_->pages_;
         top_ = base_->top_;
+        ways_ = base_->ways_;
         const CellMap before = base_->cells_;
         base_.reset();  // its pages are this one's alone where nobody else asks them
         cells_.words().each_other_page(before.words(), [&](size_t page) { change_page(page, before, contents); });
@@ -58,37 +53,50 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
         const size_t pages = cells_.words().pages();
         pages_.resize_pages(pages);
         top_.assign(pages, &far_page());
+        const ivec3 size = cells_.size();
+        ways_.renew().assign(size_t(size.x) * size_t(size.y) * size_t(size.z) + kWayPadding,
+                             wide_way_of(uint32_t(kMaxJump), false));
         for (size_t page = 0; page < pages; ++page) {
             if (cells_.words().find(page) != nullptr) make_page(page, contents);
         }
     }
     const ivec3 pages = cells_.pages();
-    view_ = WideView(field.grid(), top_.data(), pages.x, pages.y,
+    view_ = WideView(field.grid(), top_.data(), pages.x, pages.y, ways_->data(),
                      field.options().format == DistanceFormat::Half ? 2 : 1);
     ready_.store(true, std::memory_order_release);
 }
 
+// Word number `index` of a page, and its cell's byte.
+void WideTables::set(size_t page, size_t index, WidePage& to, const BrickContents& contents) {
+    const uint32_t word = (*cells_.words().find(page))[index];
+    const BrickContent* const brick = (word & kCellOccupied) != 0 ? &contents[word & kCellSlotMask] : nullptr;
+    to[index] = brick != nullptr ? wide_entry_of_brick(brick->codes()) : wide_entry_of_empty(word);
+    const ivec3 pages = cells_.pages(), size = cells_.size();
+    const auto along = [](size_t at, int place) { return int(at >> (3 * place) & 7); };
+    const int p = int(page);
+    const ivec3 cell{p % pages.x * kCellPage + along(index, 0), p / pages.x % pages.y * kCellPage + along(index, 1),
+                     p / (pages.x * pages.y) * kCellPage + along(index, 2)};
+    if (cell.x >= size.x || cell.y >= size.y || cell.z >= size.z) return;
+    ways_.write()[(size_t(cell.z) * size_t(size.y) + size_t(cell.y)) * size_t(size.x) + size_t(cell.x)] =
+        wide_way_of(word, brick != nullptr && brick->solid);
+}
+
 void WideTables::make_page(size_t page, const BrickContents& contents) {
-    const CellMap::Words::Page& words = *cells_.words().find(page);
     WidePage& out = pages_.write_page(page);
-    for (size_t i = 0; i < out.size(); ++i) out[i] = entry_of(words[i], contents);
+    for (size_t i = 0; i < out.size(); ++i) set(page, i, out, contents);
     top_[page] = &out;
 }
 
 void WideTables::change_page(size_t page, const CellMap& before, const BrickContents& contents) {
     const CellMap::Words::Page* const old = before.words().find(page);
     const CellMap::Words::Page* const now = cells_.words().find(page);
-    if (now == nullptr) {
-        top_[page] = &far_page();
-        return;
-    }
-    if (old == nullptr) {
+    if (old == nullptr || now == nullptr) {  // a page that was written stays so
         make_page(page, contents);
         return;
     }
     WidePage& out = pages_.write_page(page);
     for (size_t i = 0; i < out.size(); ++i) {
-        if ((*old)[i] != (*now)[i]) out[i] = entry_of((*now)[i], contents);
+        if ((*old)[i] != (*now)[i]) set(page, i, out, contents);
     }
     top_[page] = &out;
 }
@@ -97,11 +105,12 @@ void WideTables::change_brick(uint32_t slot, const Field& field, const BrickCont
     const BrickRecord& record = field.records()[slot];
     if (record.code_count == 0) return;  // gone again
     const GridParams g = field.grid();
-    const size_t index = cells_.index(record.texel_x / kBrickVoxels - g.cell_x, record.texel_y / kBrickVoxels - g.cell_y,
-                                      record.texel_z / kBrickVoxels - g.cell_z);
+    const size_t index =
+        cells_.index(record.texel_x / kBrickVoxels - g.cell_x, record.texel_y / kBrickVoxels - g.cell_y,
+                     record.texel_z / kBrickVoxels - g.cell_z);
     const size_t page = index / Pages::kPageSize;
     WidePage& out = pages_.write_page(page);
-    out[index % Pages::kPageSize] = entry_of(cells_.words()[index], contents);
+    set(page, index % Pages::kPageSize, out, contents);
     top_[page] = &out;
 }
 

@@ -3,6 +3,7 @@
 // then only cells that changed since are looked at, and pages of cells that did not change are shared.
 #pragma once
 
+#include "base/shared.h"
 #include "field/brick_content.h"
 #include "field/field.h"
 #include "field/wide.h"
@@ -31,6 +32,7 @@ private:
     using Pages = PagedArray<WideEntry, std::tuple_size_v<WidePage>>;
 
     void make(const Field& field, const BrickContents& contents);
+    void set(size_t page, size_t index, WidePage& to, const BrickContents& contents);
     void make_page(size_t page, const BrickContents& contents);
     void change_page(size_t page, const CellMap& before, const BrickContents& contents);
     void change_brick(uint32_t slot, const Field& field, const BrickContents& contents);
@@ -42,6 +44,7 @@ private:
     CellMap cells_;  // the words that entries were made from
     Pages pages_;
     std::vector<const WidePage*> top_;
+    Shared<std::vector<uint8_t>> ways_;
     WideView view_;
 
     // Until then: tables that are ready, and slots baked since. None: everything is to be made.
