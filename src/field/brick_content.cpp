@@ -56,9 +56,11 @@ private:
 };
 
 template <typename Code>
-bool find_solid(BrickCodes<Code>& brick) {
-    brick.solid = solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), int(sizeof(Code))));
-    return brick.solid.box != 0;
+uint32_t find_solid(BrickCodes<Code>& brick) {
+    const SolidVoxels found =
+        solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), int(sizeof(Code))));
+    brick.solid = found.rows;
+    return found.box;
 }
 
 uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; }
@@ -80,12 +82,12 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
     if (format == DistanceFormat::Half) {
         HalfCodes& brick = out.half.renew();
         sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, brick.codes.data());
-        out.solid = find_solid(brick);
+        out.solid_box = find_solid(brick);
     } else {
         ByteCodes& brick = out.bytes.renew();
         for (size_t i = 0; i < brick.codes.size(); ++i)
             brick.codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
-        out.solid = find_solid(brick);
+        out.solid_box = find_solid(brick);
     }
     if (only) {
         out.material = *only;

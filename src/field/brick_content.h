@@ -22,16 +22,15 @@ enum class DistanceFormat : uint8_t { Half, Snorm8 };
 /// 512 codes, x fastest, then y, then z; before them what a ray asks first. Behind the count of a Shared, codes begin a cache line.
 template <typename Code>
 struct BrickCodes {
-    SolidVoxels solid;
+    SolidRows solid{};
     std::array<Code, kBrickTexelCount> codes{};
 };
 using HalfCodes = BrickCodes<uint16_t>;
 using ByteCodes = BrickCodes<uint8_t>;
 /// Of both, from codes back.
-inline constexpr int kSolidRowsBeforeCodes = 60, kSolidBoxBeforeCodes = 4;
+inline constexpr int kSolidRowsBeforeCodes = 60;
 static_assert(offsetof(HalfCodes, codes) == kSolidRowsBeforeCodes &&
               offsetof(ByteCodes, codes) == kSolidRowsBeforeCodes);
-static_assert(offsetof(SolidVoxels, box) == kSolidRowsBeforeCodes - kSolidBoxBeforeCodes);
 
 /// Materials of a brick with more than one: a word a texel (codes.gpu.h), 0 outside the band where no surface asks; 16 material numbers,
 /// ascending, the unused ones kNoMaterial.
@@ -47,7 +46,7 @@ struct BrickContent {
     Shared<ByteCodes> bytes;
     Shared<BrickMaterials> materials;
     uint16_t material = 0;
-    bool solid = false;  ///< some texel is
+    uint32_t solid_box = kNoSolidBox;
 
     explicit operator bool() const { return half || bytes; }
     const std::byte* codes() const {

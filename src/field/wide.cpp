@@ -17,7 +17,10 @@ WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast
 
 }  // namespace
 
-WideEntry wide_entry_of_brick(const std::byte* codes) { return kWideOccupied | address_of(codes); }
+WideEntry wide_entry_of_brick(const std::byte* codes, uint32_t box) {
+    const uint32_t kept = box & (kNoSolidBox - 1);
+    return kWideOccupied | WideEntry(kept >> 2) << kWideBoxShift | (kept & 3) | address_of(codes);
+}
 uint8_t wide_way_of(uint32_t word, bool solid) {
     if ((word & kCellOccupied) != 0) return solid ? kWaySolid : uint8_t(0);
     return uint8_t(((word & kCellInside) != 0 ? kWayInside : 0) | (std::max(word & 7u, 1u) - 1));

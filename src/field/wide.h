@@ -12,15 +12,20 @@
 
 namespace kiln::field {
 
-/// What the wide loops know of a cell, in one word: where to read texels (always somewhere), and what the cell word says. By cell_word_index().
+/// What the wide loops know of a cell, in one word: where to read codes (always somewhere), and, where it has a brick, its solid box: 16 bits
+/// above the address and two below; else sign and jump. By cell_word_index(). Addresses have 47 bits and are multiples of 16.
 using WideEntry = uint64_t;
 using WidePage = std::array<WideEntry, kCellPage * kCellPage * kCellPage>;
 inline constexpr WideEntry kWideOccupied = 1ull << 63;
-inline constexpr WideEntry kWideInside = 1ull << 62;
-inline constexpr int kWideJumpShift = 48;  // three bits
-inline constexpr WideEntry kWideAddress = (1ull << kWideJumpShift) - 1;
+inline constexpr WideEntry kWideInside = 1ull << 62;  // of an empty cell
+inline constexpr int kWideJumpShift = 48;             // three bits, of an empty cell
+inline constexpr int kWideBoxShift = 47;              // 16 bits, of a brick
+inline constexpr WideEntry kWideAddress = (1ull << 47) - 16;
 
-WideEntry wide_entry_of_brick(const std::byte* codes);
+WideEntry wide_entry_of_brick(const std::byte* codes, uint32_t solid_box);
+inline uint32_t wide_solid_box(WideEntry of_brick) {
+    return uint32_t(of_brick >> kWideBoxShift & 0xffff) << 2 | uint32_t(of_brick & 3);
+}
 /// Of an empty cell's word.
 WideEntry wide_entry_of_empty(uint32_t word);
 

@@ -341,7 +341,8 @@ struct Marching {
             const int index = cell_word_index(x[i], y[i], z[i], view.pages_x, view.pages_y);
             const WideEntry entry = (*view.pages[index / kPageWords])[size_t(index % kPageWords)];
             bricks[i] = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-            std::memcpy(&boxes[i], bricks[i] - kSolidBoxBeforeCodes, 4);
+            boxes[i] = int32_t(wide_solid_box(entry));
+            __builtin_prefetch(bricks[i] - kSolidRowsBeforeCodes);
         });
         const I box = boxes.all();
         ray = select(m, brick_ray_of(packet, {cell.x * kBrickVoxels, cell.y * kBrickVoxels, cell.z * kBrickVoxels}), ray);
@@ -405,6 +406,12 @@ struct Marching {
         enter = select(m, select(skips, to_any, in), enter);
         leave = select(m, out, leave);
         past = select(m, from_any, past);
+        Lanes texel(texel_of(at));
+        each_lane(alive, [&](int i) {  // they will be read here or nearby
+            const std::byte* const row = bricks[i] + texel[i] * (Half ? 2 : 1);
+            __builtin_prefetch(row);
+            __builtin_prefetch(row + 72 * (Half ? 2 : 1));
+        });
         walking = either(walking, alive);
         go_on(without(m, alive));
     }

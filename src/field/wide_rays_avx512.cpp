@@ -75,7 +75,9 @@ static inline F min(F x, F y) { return {one::min(x.a, y.a), one::min(x.b, y.b)};
 static inline F max(F x, F y) { return {one::max(x.a, y.a), one::max(x.b, y.b)}; }
 static inline F floor(F v) { return {one::floor(v.a), one::floor(v.b)}; }
 static inline F sqrt(F v) { return {one::sqrt(v.a), one::sqrt(v.b)}; }
-static inline I gather_bytes(const void* base, I index) { return {one::gather_bytes(base, index.a), one::gather_bytes(base, index.b)}; }
+static inline I gather_bytes(const void* base, I index) {
+    return {one::gather_bytes(base, index.a), one::gather_bytes(base, index.b)};
+}
 
 #include "field/wide_math.inl"
 

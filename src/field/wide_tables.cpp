@@ -70,7 +70,7 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
 void WideTables::set(size_t page, size_t index, WidePage& to, const BrickContents& contents) {
     const uint32_t word = (*cells_.words().find(page))[index];
     const BrickContent* const brick = (word & kCellOccupied) != 0 ? &contents[word & kCellSlotMask] : nullptr;
-    to[index] = brick != nullptr ? wide_entry_of_brick(brick->codes()) : wide_entry_of_empty(word);
+    to[index] = brick != nullptr ? wide_entry_of_brick(brick->codes(), brick->solid_box) : wide_entry_of_empty(word);
     const ivec3 pages = cells_.pages(), size = cells_.size();
     const auto along = [](size_t at, int place) { return int(at >> (3 * place) & 7); };
     const int p = int(page);
@@ -78,7 +78,7 @@ void WideTables::set(size_t page, size_t index, WidePage& to, const BrickContent
                      p / (pages.x * pages.y) * kCellPage + along(index, 2)};
     if (cell.x >= size.x || cell.y >= size.y || cell.z >= size.z) return;
     ways_.write()[(size_t(cell.z) * size_t(size.y) + size_t(cell.y)) * size_t(size.x) + size_t(cell.x)] =
-        wide_way_of(word, brick != nullptr && brick->solid);
+        wide_way_of(word, brick != nullptr && brick->solid_box != kNoSolidBox);
 }
 
 void WideTables::make_page(size_t page, const BrickContents& contents) {

@@ -39,7 +39,7 @@ TEST(Solid, RowsAndBoxNameTheVoxelsWithASolidCorner) {
             first = {std::min(first.x, x), std::min(first.y, y), std::min(first.z, z)};
             last = {std::max(last.x, x), std::max(last.y, y), std::max(last.z, z)};
         }
-        ASSERT_EQ(voxels.box, last.x < 0 ? 0u : solid_box(first, last)) << "round " << round;
+        ASSERT_EQ(voxels.box, last.x < 0 ? kNoSolidBox : solid_box(first, last)) << "round " << round;
     }
 }
 
