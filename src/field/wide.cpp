@@ -10,8 +10,8 @@
 namespace kiln::field {
 namespace {
 
-// Where points and rays without a brick read: what they find is not looked at. Codes begin at 64, as after BrickCodes' own head.
-alignas(64) constexpr std::byte kNoBrick[64 + 2 * kBrickTexelCount] = {};
+// Where points without a brick read: what they find is not looked at.
+alignas(64) constexpr std::byte kNoTexels[2 * kBrickTexelCount] = {};
 
 WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast<uintptr_t>(codes)) & kWideAddress; }
 
@@ -27,9 +27,8 @@ uint8_t wide_way_of(uint32_t word, bool solid) {
 }
 WideEntry wide_entry_of_empty(uint32_t word) {
     return ((word & kCellInside) != 0 ? kWideInside : 0) | WideEntry(word & 7u) << kWideJumpShift |
-           address_of(wide_no_texels());
+           address_of(kNoTexels);
 }
-const std::byte* wide_no_texels() { return kNoBrick + 64; }
 
 WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y,
                    const uint8_t* first_way, int bytes)

@@ -36,9 +36,6 @@ inline constexpr uint8_t kWayReach = 7;
 inline constexpr int kWayPadding = 3;  // bytes behind the last cell's
 uint8_t wide_way_of(uint32_t word, bool solid);
 
-/// Codes of no brick, to read where there is none.
-const std::byte* wide_no_texels();
-
 /// Where the wide loops find a field. Lives as long as the pages and bricks it was made of.
 struct WideView {
     GridParams grid{};

@@ -29,15 +29,6 @@ static inline int count(M m) { return __builtin_popcount(bits(m)); }
 struct Pointers {
     __m256i low, high;  // of the first and the last four lanes
 };
-static inline Pointers same_pointer(const std::byte* p) {
-    const __m256i all_of_it = _mm256_set1_epi64x(reinterpret_cast<intptr_t>(p));
-    return {all_of_it, all_of_it};
-}
-static inline Pointers select(M m, const Pointers& a, const Pointers& b) {
-    const __m256i low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)m)),
-                  high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)m, 1));
-    return {_mm256_blendv_epi8(b.low, a.low, low), _mm256_blendv_epi8(b.high, a.high, high)};
-}
 static inline Pointers gather_pages(const WidePage* const* table, I index) {
     const auto* const from = reinterpret_cast<const long long*>(table);
     return {_mm256_i32gather_epi64(from, _mm256_castsi256_si128((__m256i)index), 8),

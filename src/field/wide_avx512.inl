@@ -33,14 +33,6 @@ static inline uint32_t bits(M m) { return m; }
 struct Pointers {
     __m512i low, high;  // of the first and the last eight lanes
 };
-static inline Pointers same_pointer(const std::byte* p) {
-    const __m512i all_of_it = _mm512_set1_epi64(reinterpret_cast<intptr_t>(p));
-    return {all_of_it, all_of_it};
-}
-static inline Pointers select(M m, const Pointers& a, const Pointers& b) {
-    return {_mm512_mask_blend_epi64(__mmask8(m), b.low, a.low),
-            _mm512_mask_blend_epi64(__mmask8(m >> 8), b.high, a.high)};
-}
 static inline Pointers gather_pages(const WidePage* const* table, I index) {
     return {_mm512_i32gather_epi64(_mm512_castsi512_si256(i(index)), table, 8),
             _mm512_i32gather_epi64(_mm512_extracti64x4_epi64(i(index), 1), table, 8)};

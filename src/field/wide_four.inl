@@ -20,12 +20,6 @@ static inline int count(M m) { return int(0x4332322132212110u >> (4 * bits(m)) &
 struct Pointers {
     const std::byte* at[kLanes];
 };
-static inline Pointers same_pointer(const std::byte* p) { return {{p, p, p, p}}; }
-static inline Pointers select(M m, const Pointers& a, const Pointers& b) {
-    Pointers out;
-    for (int lane = 0; lane < kLanes; ++lane) out.at[lane] = m[lane] != 0 ? a.at[lane] : b.at[lane];
-    return out;
-}
 static inline Pointers gather_pages(const WidePage* const* table, I index) {
     const auto page = [&](int lane) { return reinterpret_cast<const std::byte*>(table[index[lane]]); };
     return {{page(0), page(1), page(2), page(3)}};

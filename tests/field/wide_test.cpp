@@ -163,6 +163,50 @@ TEST_P(WideInEachFormat, RaysHaveTheBitsOfTheScalarMarchOnEveryInstructionSet) {
     for (const int count : states) EXPECT_GT(count, 100);
 }
 
+// Through edges and corners of voxels, bricks and boxes, where which plane is crossed first is a tie; and from lattice points within bricks.
+std::vector<Ray> rays_through_the_lattice() {
+    std::mt19937 random(17);
+    const float h = 0.03f;
+    std::vector<Ray> out;
+    for (int i = 0; i < 30000; ++i) {
+        const auto side = [&] { return float(int(random() % 5) - 2) * 0.5f; };
+        vec3 d{side(), side(), side()};
+        if (i % 3 == 0) d = {d.x < 0 ? -1.0f : 1.0f, d.y < 0 ? -1.0f : 1.0f, d.z < 0 ? -1.0f : 1.0f};
+        if (dot(d, d) == 0) d.x = 1;
+        const float nudge = i % 4 == 0 ? 1e-6f : 0.0f;
+        const auto texel = [&] { return float(int(random() % 61) - 30) + nudge * float(int(random() % 5) - 2); };
+        const vec3 to{texel() * h, texel() * h, texel() * h};
+        const float steps = i % 2 == 0 ? 0.0f : float(random() % 60) * h;
+        out.push_back({.origin = to - d * steps, .direction = normalize(d)});
+    }
+    return out;
+}
+
+TEST_P(WideInEachFormat, RaysThroughEdgesAndCornersHaveTheBitsOfTheScalarMarch) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const std::vector<Ray> rays = rays_through_the_lattice();
+    const float h = bricks.field().grid().voxel_size;
+    std::vector<MarchHit> one(rays.size()), wide(rays.size());
+    int hits = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        const vec3& o = rays[i].origin;
+        one[i] =
+            bricks.march(texel_ray_of({double(o.x), double(o.y), double(o.z)}, rays[i].direction, h), 0, kFarVoxels);
+        hits += one[i].state == kMarchHit;
+    }
+    EXPECT_GT(hits, 3000);
+    for (const sdf::Isa isa : isas()) {
+        bricks.march(rays, wide.data(), isa);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            ASSERT_EQ(wide[i].state, one[i].state) << "isa " << int(isa) << " ray " << i;
+            ASSERT_EQ(std::bit_cast<uint32_t>(wide[i].t), std::bit_cast<uint32_t>(one[i].t)) << "ray " << i;
+            ASSERT_EQ(wide[i].slot, one[i].slot) << "ray " << i;
+            ASSERT_EQ(wide[i].voxel, one[i].voxel) << "ray " << i;
+            ASSERT_EQ(wide[i].p, one[i].p) << "ray " << i;
+        }
+    }
+}
+
 TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
     std::vector<Edit> edits = mixed();
     HostBricks bricks = bricks_of(GetParam(), edits);
