@@ -6,6 +6,7 @@
 
 #include "base/shared.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -42,6 +43,17 @@ public:
     const T& fill() const { return fill_; }
     bool same_page(const PagedArray& other, size_t page) const {
         return page < other.pages_ && find(page) == other.find(page);
+    }
+
+    /// fn(page) for each page that the other, of as many pages, does not share. Groups that are shared are passed over whole.
+    template <typename Fn>
+    void each_other_page(const PagedArray& other, Fn&& fn) const {
+        for (size_t group = 0; group < groups_.size(); ++group) {
+            if (groups_[group] == other.groups_[group]) continue;
+            for (size_t page = group * kGroup; page < std::min((group + 1) * kGroup, pages_); ++page) {
+                if (find(page) != other.find(page)) fn(page);
+            }
+        }
     }
 
     T& write(size_t i) { return write_page(i / kPage)[i % kPage]; }

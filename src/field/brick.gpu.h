@@ -57,17 +57,12 @@ struct GridParams {
 // word = slot0 | slot1 << 4 | weight << 8; share = weight / 510. A brick's palette is 16 material numbers (kPaletteSize uints) at slot * 16.
 KILN_CONST int kPaletteSize = 16;
 
-// What a renderer keeps of a brick beside its texels, words at slot * kBrickTableWords: the palette; then, a bit a voxel, whether any
-// of its eight texels is solid. A ray meets nothing in the other voxels.
+// What a renderer keeps of a brick beside its texels, words at slot * kBrickTableWords: the palette; then SolidRows of solid.h, which voxels
+// have a solid texel, a byte a row and a bit a voxel. A ray meets nothing in the others.
 KILN_CONST int kBrickTableWords = 32;
-KILN_CONST int kSolidMaskWords = 14;  // two a layer of z: y 0 … 3 and 4 … 6, seven bits a row
+KILN_CONST int kSolidMaskWords = 14;  // two a layer of z
 KILN_FN int solid_mask_word(int y, int z) { return kPaletteSize + 2 * z + (y >> 2); }
-KILN_FN int solid_mask_bit(int x, int y) { return (y & 3) * 7 + x; }
-// A row of voxels of the mask, from the solid texels (a bit each) of the four rows of texels around it.
-KILN_FN uint solid_voxels(uint row_00, uint row_10, uint row_01, uint row_11) {
-    uint any = row_00 | row_10 | row_01 | row_11;
-    return (any | (any >> 1)) & 127u;
-}
+KILN_FN int solid_mask_bit(int x, int y) { return (y & 3) * 8 + x; }
 
 #ifdef __cplusplus
 static_assert(sizeof(BrickRecord) == 32 && sizeof(GridParams) == 32);

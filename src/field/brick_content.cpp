@@ -55,6 +55,14 @@ private:
     int heaviest_slot_ = 0;
 };
 
+template <typename Code>
+uint32_t find_solid(BrickCodes<Code>& brick) {
+    const SolidVoxels found =
+        solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), int(sizeof(Code))));
+    brick.solid = found.rows;
+    return found.box;
+}
+
 uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; }
 
 }  // namespace
@@ -82,10 +90,14 @@ float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 fir
 BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16_t> only) const {
     BrickContent out;
     if (format == DistanceFormat::Half) {
-        sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, out.half.renew().data());
+        HalfCodes& brick = out.half.renew();
+        sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, brick.codes.data());
+        out.solid_box = find_solid(brick);
     } else {
-        ByteCodes& codes = out.bytes.renew();
-        for (size_t i = 0; i < codes.size(); ++i) codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
+        ByteCodes& brick = out.bytes.renew();
+        for (size_t i = 0; i < brick.codes.size(); ++i)
+            brick.codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
+        out.solid_box = find_solid(brick);
     }
     if (only) {
         out.material = *only;

@@ -2,22 +2,35 @@
 // What is in a brick, made on the CPU from its pruned code: texel positions, distances, the codes and materials that are stored.
 #pragma once
 
+#include "base/paged_array.h"
 #include "base/shared.h"
 #include "field/brick.gpu.h"
 #include "field/codes.gpu.h"
+#include "field/solid.h"
 #include "sdf/eval.h"
 
 #include <array>
+#include <cstddef>
 #include <optional>
+#include <span>
 
 namespace kiln::field {
 
 /// How texels store distance. Half: 16-bit float of voxels; Snorm8: 8-bit, band / 127 a step.
 enum class DistanceFormat : uint8_t { Half, Snorm8 };
 
-/// 512 codes each, x fastest, then y, then z.
-using HalfCodes = std::array<uint16_t, kBrickTexelCount>;
-using ByteCodes = std::array<uint8_t, kBrickTexelCount>;
+/// 512 codes, x fastest, then y, then z; before them what a ray asks first. Behind the count of a Shared, codes begin a cache line.
+template <typename Code>
+struct BrickCodes {
+    SolidRows solid{};
+    std::array<Code, kBrickTexelCount> codes{};
+};
+using HalfCodes = BrickCodes<uint16_t>;
+using ByteCodes = BrickCodes<uint8_t>;
+/// Of both, from codes back.
+inline constexpr int kSolidRowsBeforeCodes = 60;
+static_assert(offsetof(HalfCodes, codes) == kSolidRowsBeforeCodes &&
+              offsetof(ByteCodes, codes) == kSolidRowsBeforeCodes);
 
 /// Materials of a brick with more than one: a word a texel (codes.gpu.h), 0 outside the band where no surface asks; 16 material numbers,
 /// ascending, the unused ones kNoMaterial.
@@ -33,9 +46,16 @@ struct BrickContent {
     Shared<ByteCodes> bytes;
     Shared<BrickMaterials> materials;
     uint16_t material = 0;
+    uint32_t solid_box = kNoSolidBox;
 
     explicit operator bool() const { return half || bytes; }
-    float distance(size_t texel) const { return half ? half_value((*half)[texel]) : snorm8_value((*bytes)[texel]); }
+    const std::byte* codes() const {
+        return half ? std::as_bytes(std::span(half->codes)).data() : std::as_bytes(std::span(bytes->codes)).data();
+    }
+    const SolidRows& solid() const { return half ? half->solid : bytes->solid; }
+    float distance(size_t texel) const {
+        return half ? half_value(half->codes[texel]) : snorm8_value(bytes->codes[texel]);
+    }
     uint16_t word(size_t texel) const { return materials ? materials->words[texel] : uint16_t(0); }
     uint32_t palette(size_t slot) const {
         return materials ? materials->palette[slot] : slot == 0 ? uint32_t(material) : sdf::kNoMaterial;
@@ -48,6 +68,8 @@ struct BrickContent {
 /// agree about the texels they share.
 double texel_position(int texel, float voxel_size);
 inline constexpr int kNearCells = 2048;
+/// By slot.
+using BrickContents = PagedArray<BrickContent, 16>;
 
 /// Evaluates bricks, one after another. One thread.
 class BrickEvaluator {

@@ -90,8 +90,8 @@ Result<void> HostBricks::update(std::shared_ptr<const sdf::Program> program, std
 }
 
 void HostBricks::take(MadeBricks& made) {
-    tables_ = std::make_shared<Tables>();
-    contents_.resize_pages(field_->slot_count() / Contents::kPageSize + 1);
+    tables_ = WideTables::after(tables_, made);
+    contents_.resize_pages(field_->slot_count() / BrickContents::kPageSize + 1);
     for (auto& [slot, content] : made) contents_.write(slot) = std::move(content);
 }
 
@@ -221,66 +221,15 @@ HostBricks::Hit HostBricks::cast(dvec3 origin_world, vec3 direction, double t_ma
     return out;
 }
 
-void HostBricks::fill_tables() const {
-    const std::lock_guard lock(tables_->mutex);
-    if (tables_->ready.load(std::memory_order_relaxed)) return;
-    const CellMap& map = field_->cells();
-    const ivec3 size = map.size(), pages = map.pages();
-    std::vector<uint32_t>& cells = tables_->cells;
-    cells.assign(size_t(size.x) * size_t(size.y) * size_t(size.z), map.words().fill());
-    for (int z = 0; z < size.z; ++z) {
-        for (int y = 0; y < size.y; ++y) {
-            uint32_t* const row = cells.data() + (size_t(z) * size_t(size.y) + size_t(y)) * size_t(size.x);
-            for (int px = 0; px < pages.x; ++px) {
-                const auto* const page = map.words().find(map.page_index(px, y / kCellPage, z / kCellPage));
-                if (page == nullptr) continue;
-                const int first = px * kCellPage;
-                const size_t in_page = map.index(first, y, z) % page->size();
-                std::copy_n(page->begin() + ptrdiff_t(in_page), std::min(kCellPage, size.x - first), row + first);
-            }
-        }
-    }
-    static const std::array<std::byte, 2 * kBrickTexelCount> no_texels{};
-    tables_->bricks.assign(field_->slot_count(), no_texels.data());
-    for (uint32_t slot = 0; slot < tables_->bricks.size(); ++slot) {
-        const BrickContent& brick = content(slot);
-        if (brick.half) tables_->bricks[slot] = std::as_bytes(std::span(*brick.half)).data();
-        if (brick.bytes) tables_->bricks[slot] = std::as_bytes(std::span(*brick.bytes)).data();
-    }
-    if (tables_->bricks.empty()) tables_->bricks.push_back(no_texels.data());
-    tables_->ready.store(true, std::memory_order_release);
-}
-
-void HostBricks::fill_solid() const {
-    const std::lock_guard lock(tables_->mutex);
-    if (tables_->solid_ready.load(std::memory_order_relaxed)) return;
-    const std::vector<const std::byte*>& bricks = tables_->bricks;
-    tables_->solid.resize(bricks.size() * kSolidMaskBytes + 3);  // gathers read four bytes
-    parallel_for(
-        bricks.size(), 0,
-        [&](int slot) {
-            solid_mask(bricks[size_t(slot)], texel_bytes(), tables_->solid.data() + size_t(slot) * kSolidMaskBytes);
-        },
-        256);
-    tables_->solid_ready.store(true, std::memory_order_release);
-}
-
-WideView HostBricks::wide_view() const {
-    if (!tables_->ready.load(std::memory_order_acquire)) fill_tables();
-    return {field_->grid(), tables_->cells.data(), tables_->bricks.data(), texel_bytes(), nullptr};
-}
-
 void HostBricks::distances(const sdf::Points& points, float* out, sdf::Isa isa) const {
     wide_distances(wide_view(), points, out, isa);
 }
 
-float HostBricks::distance(vec3 p) const { return wide_distance(wide_view(), p); }
+float HostBricks::distance(vec3 p, sdf::Isa isa) const { return wide_distance(wide_view(), p, isa); }
 
 void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const {
-    constexpr size_t kBlock = 256;
-    WideView view = wide_view();
-    if (!tables_->solid_ready.load(std::memory_order_acquire)) fill_solid();
-    view.solid = tables_->solid.data();
+    constexpr size_t kBlock = 512;
+    const WideView& view = wide_view();
     const double h = double(view.grid.voxel_size);
     int32_t whole[3][kBlock];
     float part[3][kBlock], direction[3][kBlock], far[kBlock];
@@ -308,6 +257,11 @@ void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) 
                     {direction[0], direction[1], direction[2]},
                     far},
                    int(count), hits + first, isa);
+        for (size_t i = 0; i < count; ++i) {
+            MarchHit& hit = hits[first + i];
+            if (hit.state == kMarchHit)
+                hit.slot = int(field_->cell_word(hit.cell.x, hit.cell.y, hit.cell.z) & kCellSlotMask);
+        }
     }
 }
 
@@ -323,8 +277,8 @@ uint64_t HostBricks::hash() const {
                     continue;
                 }
                 const BrickContent& brick = content(word & kCellSlotMask);
-                sum = hash_combine(sum, brick.half ? hash64_of(std::span<const uint16_t>(*brick.half))
-                                                   : hash64_of(std::span<const uint8_t>(*brick.bytes)));
+                sum = hash_combine(sum, brick.half ? hash64_of(std::span<const uint16_t>(brick.half->codes))
+                                                   : hash64_of(std::span<const uint8_t>(brick.bytes->codes)));
                 sum = hash_combine(sum, brick.material);
                 if (!brick.materials) continue;
                 sum = hash_combine(sum, hash64_of(std::span<const uint16_t>(brick.materials->words)));

@@ -6,16 +6,13 @@
 #include "field/codes.gpu.h"
 #include "field/cubic.gpu.h"
 #include "field/field.h"
-#include "field/wide.h"
+#include "field/wide_tables.h"
 
 #include <kiln/query.h>
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <span>
-#include <vector>
 
 namespace kiln::field {
 
@@ -62,7 +59,7 @@ public:
     /// distance); in empty cells as far as the empty cells around reach, with the right sign: a lower bound of the size; 0 outside
     /// the grid, where nothing is known. The same bits from every instruction set and from distance().
     void distances(const sdf::Points& points, float* out, sdf::Isa isa = sdf::best_isa()) const;
-    float distance(vec3 p_world) const;
+    float distance(vec3 p_world, sdf::Isa isa = sdf::best_isa()) const;
 
     struct Hit {
         int state = kMarchMiss;  ///< kMarchMiss, kMarchHit, kMarchInside
@@ -85,26 +82,15 @@ public:
     uint64_t hash() const;
 
 private:
-    using Contents = PagedArray<BrickContent, 16>;
     void take(MadeBricks& made);
     void bake_slots(std::span<const uint32_t> slots, int workers);
     void surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, NormalKind kind, Sample& out) const;
 
-    // Plain tables of one state of the bricks for the wide loops, made when it is first asked: nanoseconds a cell and brick.
-    struct Tables {
-        std::atomic<bool> ready = false, solid_ready = false;
-        std::mutex mutex;
-        std::vector<uint32_t> cells;           // words by index in the grid
-        std::vector<const std::byte*> bricks;  // codes by slot; some brick's where a slot is free
-        std::vector<std::byte> solid;          // solid_mask() by slot
-    };
-    WideView wide_view() const;
-    void fill_tables() const;
-    void fill_solid() const;
+    const WideView& wide_view() const { return tables_->view(*field_, contents_); }
 
     std::shared_ptr<const Field> field_;
-    Contents contents_;                                            // by slot
-    std::shared_ptr<Tables> tables_ = std::make_shared<Tables>();  // of field_ and contents_ as they are
+    BrickContents contents_;
+    std::shared_ptr<WideTables> tables_ = std::make_shared<WideTables>();  // of field_ and contents_ as they are
 };
 
 /// A world position as whole and fractional texel coordinates.

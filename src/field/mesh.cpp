@@ -6,18 +6,13 @@
 namespace kiln::field {
 namespace {
 
-const std::byte* codes_of(const BrickContent& content) {
-    return content.half ? std::as_bytes(std::span(*content.half)).data()
-                        : std::as_bytes(std::span(*content.bytes)).data();
-}
-
 std::vector<MeshBrick> bricks_of(const HostBricks& host) {
     const Field& field = host.field();
     std::vector<MeshBrick> out;
     for (const uint32_t slot : field.slots()) {
         const BrickRecord& r = field.records()[slot];
         const ivec3 cell{r.texel_x / kBrickVoxels, r.texel_y / kBrickVoxels, r.texel_z / kBrickVoxels};
-        out.push_back({cell, slot, codes_of(host.content(slot))});
+        out.push_back({cell, slot, host.content(slot).codes()});
     }
     return out;
 }
@@ -32,7 +27,7 @@ std::vector<MeshBrick> bricks_of(const HostBricks& host, const MeshRegion& regio
                 const uint32_t word = host.field().cell_word(x, y, z);
                 if ((word & kCellOccupied) == 0) continue;
                 const uint32_t slot = word & kCellSlotMask;
-                out.push_back({{x, y, z}, slot, codes_of(host.content(slot))});
+                out.push_back({{x, y, z}, slot, host.content(slot).codes()});
             }
         }
     }

@@ -3,48 +3,10 @@
 
 #include "base/parallel_for.h"
 
-#ifdef __SSE2__
-#include <immintrin.h>
-#endif
-
 namespace kiln::field {
 namespace {
 
 enum Lower { kX, kXY, kY, kXaboveY, kYZ, kXZ, kZ, kXaboveZ, kYaboveZ };  // kLower's places
-
-// A texel is solid where its code, as a signed number, is not above 0: in both formats 0 is exactly 0 and the sign is on top.
-void solid_texels(const std::byte* codes, DistanceFormat format, std::array<Slice, 8>& out) {
-#ifdef __SSE2__
-    const __m128i zero = _mm_setzero_si128();
-    const auto at = [&](int block) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes) + block); };
-    for (int z = 0; z < 8; ++z) {
-        Slice empty = 0;
-        for (int pair = 0; pair < 4; ++pair) {
-            const int block = z * 4 + pair;
-            const __m128i above =
-                format == DistanceFormat::Half
-                    ? _mm_packs_epi16(_mm_cmpgt_epi16(at(2 * block), zero), _mm_cmpgt_epi16(at(2 * block + 1), zero))
-                    : _mm_cmpgt_epi8(at(block), zero);
-            empty |= Slice(uint32_t(_mm_movemask_epi8(above))) << 16 * pair;
-        }
-        out[size_t(z)] = ~empty;
-    }
-#else
-    for (size_t z = 0; z < 8; ++z) {
-        out[z] = 0;
-        for (size_t i = 0; i < 64; ++i) {
-            const size_t texel = z * 64 + i;
-            bool empty = int8_t(codes[texel]) > 0;
-            if (format == DistanceFormat::Half) {
-                int16_t code;
-                std::memcpy(&code, codes + 2 * texel, 2);
-                empty = code > 0;
-            }
-            out[z] |= Slice(!empty) << i;
-        }
-    }
-#endif
-}
 
 constexpr Slice kRow = 0xff;
 constexpr Slice kColumn = 0x0101010101010101u;
@@ -93,7 +55,7 @@ void MeshEdges::count_row(const MeshBricks::Row& row, Count items) {
     for (uint32_t i = row.first; i < row.end; ++i) {
         BrickEdges& brick = edges_[i];
         brick.edges = brick.items = 0;
-        solid_texels(all[i].codes, bricks_.format(), brick.solid);
+        brick.solid = solid_texels(all[i].codes, bricks_.format() == DistanceFormat::Half ? 2 : 1);
         Slice any = 0, every = ~Slice(0);
         for (const Slice s : brick.solid) any |= s, every &= s;
         brick.crossed = any != 0 && every != ~Slice(0);

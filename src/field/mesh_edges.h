@@ -6,14 +6,12 @@
 #pragma once
 
 #include "field/mesh.h"
+#include "field/solid.h"
 
 #include <array>
 #include <bit>
 
 namespace kiln::field {
-
-/// Bits of a slice of texels: bit y * 8 + x.
-using Slice = uint64_t;
 
 inline uint32_t bits_of(uint64_t word) {  // the plain instruction set has no population count
     word -= word >> 1 & 0x5555555555555555u;

@@ -13,22 +13,23 @@ typedef int32_t I __attribute__((vector_size(32)));
 
 #include "field/wide_masks.inl"
 
+#include "field/wide_vectors.inl"
+
 static inline bool any(M m) { return _mm256_movemask_ps((__m256)m) != 0; }
 static inline F min(F a, F b) { return (F)_mm256_min_ps((__m256)b, (__m256)a); }  // as std::min
 static inline F max(F a, F b) { return (F)_mm256_max_ps((__m256)b, (__m256)a); }
 static inline F floor(F a) { return (F)_mm256_floor_ps((__m256)a); }
 static inline F sqrt(F a) { return (F)_mm256_sqrt_ps((__m256)a); }
-static inline I gather(const void* base, I index) {
-    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 4);
-}
 static inline I gather_bytes(const void* base, I index) {
     return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 1);
 }
+static inline uint32_t bits(M m) { return uint32_t(_mm256_movemask_ps((__m256)m)); }
+static inline int count(M m) { return __builtin_popcount(bits(m)); }
 
 struct Pointers {
     __m256i low, high;  // of the first and the last four lanes
 };
-static inline Pointers gather_pointers(const std::byte* const* table, I index) {
+static inline Pointers gather_pages(const WidePage* const* table, I index) {
     const auto* const from = reinterpret_cast<const long long*>(table);
     return {_mm256_i32gather_epi64(from, _mm256_castsi256_si128((__m256i)index), 8),
             _mm256_i32gather_epi64(from, _mm256_extracti128_si256((__m256i)index, 1), 8)};
@@ -37,12 +38,27 @@ static inline Pointers moved(const Pointers& p, I bytes) {
     return {_mm256_add_epi64(p.low, _mm256_cvtepi32_epi64(_mm256_castsi256_si128((__m256i)bytes))),
             _mm256_add_epi64(p.high, _mm256_cvtepi32_epi64(_mm256_extracti128_si256((__m256i)bytes, 1)))};
 }
+static inline Pointers gather_entries(const Pointers& at, I& flags) {
+    const __m256i low = _mm256_i64gather_epi64(static_cast<const long long*>(nullptr), at.low, 1),
+                  high = _mm256_i64gather_epi64(static_cast<const long long*>(nullptr), at.high, 1);
+    // Odd halves of each 128 bits, then in order.
+    const __m256 odd = _mm256_shuffle_ps(_mm256_castsi256_ps(low), _mm256_castsi256_ps(high), 0xdd);
+    flags = (I)_mm256_permute4x64_epi64(_mm256_castps_si256(odd), 0xd8);
+    const __m256i address = _mm256_set1_epi64x(int64_t(kWideAddress));
+    return {_mm256_and_si256(low, address), _mm256_and_si256(high, address)};
+}
 template <int kBytes>
 static inline I gather_from(const Pointers& p) {
     const auto* const base = reinterpret_cast<const int*>(ptrdiff_t(kBytes));
     return (I)_mm256_set_m128i(_mm256_i64gather_epi32(base, p.high, 1), _mm256_i64gather_epi32(base, p.low, 1));
 }
 
-#include "field/wide.inl"
+#include "field/wide_math.inl"
+
+#include "field/wide_points.inl"
+
+#include "field/wide_one.inl"
+
+#include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_avx2

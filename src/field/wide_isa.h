@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Entry points of each instruction set, and what every wide_*.cpp includes before opening its namespace.
+// Entry points of each instruction set (AVX-512 has one for points and one for rays), and what every wide_*.cpp includes before opening its namespace.
 #pragma once
 
+#include "field/brick_content.h"
 #include "field/codes.gpu.h"
 #include "field/wide.h"
 
+#include <bit>
 #include <cstring>
 
 #define KILN_DECLARE_WIDE(name)                                                        \
     namespace kiln::field::name {                                                      \
+    float distance(const WideView& view, vec3 p);                                      \
     void distances(const WideView& view, const sdf::Points& points, float* out);       \
     void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits); \
     }
@@ -16,4 +19,5 @@ KILN_DECLARE_WIDE(wide_scalar)
 KILN_DECLARE_WIDE(wide_sse4)
 KILN_DECLARE_WIDE(wide_avx2)
 KILN_DECLARE_WIDE(wide_avx512)
+KILN_DECLARE_WIDE(wide_avx512_rays)
 #undef KILN_DECLARE_WIDE

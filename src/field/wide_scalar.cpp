@@ -13,6 +13,8 @@ typedef int32_t I __attribute__((vector_size(16)));
 
 #include "field/wide_masks.inl"
 
+#include "field/wide_vectors.inl"
+
 #include "field/wide_four.inl"
 
 // For |a| < 2^31, which positions in a grid are.
@@ -21,6 +23,12 @@ static inline F floor(F a) {
     return down > a ? down - 1.0f : down;
 }
 
-#include "field/wide.inl"
+#include "field/wide_math.inl"
+
+#include "field/wide_points.inl"
+
+#include "field/wide_one.inl"
+
+#include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_scalar

@@ -13,10 +13,18 @@ typedef int32_t I __attribute__((vector_size(16)));
 
 #include "field/wide_masks.inl"
 
+#include "field/wide_vectors.inl"
+
 #include "field/wide_four.inl"
 
 static inline F floor(F a) { return (F)_mm_floor_ps((__m128)a); }
 
-#include "field/wide.inl"
+#include "field/wide_math.inl"
+
+#include "field/wide_points.inl"
+
+#include "field/wide_one.inl"
+
+#include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_sse4

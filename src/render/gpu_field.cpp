@@ -36,20 +36,6 @@ bool any_cpu_only(std::span<const sdf::Instruction> code) {
     return std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); });
 }
 
-// The mask of brick.gpu.h into a brick's table.
-void write_solid_mask(const field::BrickContent& brick, uint32_t* table) {
-    std::array<uint32_t, 64> rows{};
-    for (size_t texel = 0; texel < field::kBrickTexelCount; ++texel)
-        rows[texel / 8] |= uint32_t(brick.distance(texel) <= 0) << (texel % 8);
-    for (int z = 0; z < field::kBrickVoxels; ++z) {
-        for (int y = 0; y < field::kBrickVoxels; ++y) {
-            const size_t at = size_t(z) * 8 + size_t(y);
-            table[field::solid_mask_word(y, z)] |=
-                field::solid_voxels(rows[at], rows[at + 1], rows[at + 8], rows[at + 9]) << field::solid_mask_bit(0, y);
-        }
-    }
-}
-
 uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
 
 }  // namespace
@@ -515,8 +501,7 @@ Result<void> GpuField::store_texels(std::span<const uint32_t> slots, int workers
         parallel_for(int(slice.size()), workers, [&](int i) {
             const size_t job = size_t(i);
             const field::BrickContent brick = content(slice[job]);
-            const auto* const from = brick.half ? reinterpret_cast<const std::byte*>(brick.half->data())
-                                                : reinterpret_cast<const std::byte*>(brick.bytes->data());
+            const std::byte* const from = brick.codes();
             for (size_t row = 0; row < 64; ++row) {
                 std::memcpy(codes.data() + packed_at(job, row, 8 * code_bytes), from + row * 8 * code_bytes,
                             8 * code_bytes);
@@ -525,7 +510,7 @@ Result<void> GpuField::store_texels(std::span<const uint32_t> slots, int workers
             }
             uint32_t* const table = tables.data() + job * field::kBrickTableWords;
             for (size_t entry = 0; entry < field::kPaletteSize; ++entry) table[entry] = brick.palette(entry);
-            write_solid_mask(brick, table);
+            std::memcpy(table + field::kPaletteSize, brick.solid().data(), field::kSolidMaskWords * 4);
         });
         // Tables of slots that follow each other in one write.
         for (size_t i = 0; i < slice.size();) {

@@ -382,7 +382,7 @@ TEST(HostBricks, FarEditsChangeNotOneBitOfABrick) {
         for (size_t i = 0; i < 512; ++i) {
             const BrickContent &was = before.content(slot), &is = after.content(word & kCellSlotMask);
             ASSERT_EQ(was.word(i), is.word(i));
-            ASSERT_EQ((*was.half)[i], (*is.half)[i]);
+            ASSERT_EQ(was.half->codes[i], is.half->codes[i]);
         }
         ++same;
     });

@@ -62,6 +62,11 @@ Cloud cloud() {
     Cloud out;
     for (int i = 0; i < 20011; ++i) out.add(in(random), in(random), in(random));    // not a multiple of any width
     for (int i = -40; i < 40; ++i) out.add(float(i) * 0.03f, float(i) * 0.21f, 0);  // on texels and on brick faces
+    for (int i = 0; i < 30000; ++i) {  // in the order of space, so that neighbours share cells and slices
+        const int x = i % 50, y = i / 50 % 20, z = i / 1000;
+        out.add(float(x) * 0.03f - 0.8f, float(y) * 0.031f - 0.6f, float(z) * 0.033f - 0.5f);
+    }
+    for (int i = 0; i < 3000; ++i) out.add(0.2f + 0.001f * float(i % 10), float(i / 10) * 0.004f - 0.6f, 0.1f);
     const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
     for (const float far : {inf, -inf, nan, 1e30f, -1e30f, 1e9f})
         out.add(far, 0, 0), out.add(0, far, 0), out.add(0, 0, far);
@@ -77,7 +82,9 @@ TEST_P(WideInEachFormat, DistancesAreThoseOfOnePointAtATimeOnEveryInstructionSet
         std::vector<float> out(c.x.size(), -77);
         bricks.distances(c.points(), out.data(), isa);
         for (size_t i = 0; i < out.size(); ++i) {
-            const float one = bricks.distance({c.x[i], c.y[i], c.z[i]});
+            const float one = bricks.distance({c.x[i], c.y[i], c.z[i]}, sdf::Isa::Scalar);
+            const float same = bricks.distance({c.x[i], c.y[i], c.z[i]}, isa);
+            ASSERT_EQ(std::bit_cast<uint32_t>(one), std::bit_cast<uint32_t>(same)) << "isa " << int(isa);
             ASSERT_EQ(std::bit_cast<uint32_t>(out[i]), std::bit_cast<uint32_t>(one))
                 << "isa " << int(isa) << " at " << c.x[i] << " " << c.y[i] << " " << c.z[i];
         }
@@ -156,6 +163,50 @@ TEST_P(WideInEachFormat, RaysHaveTheBitsOfTheScalarMarchOnEveryInstructionSet) {
     for (const int count : states) EXPECT_GT(count, 100);
 }
 
+// Through edges and corners of voxels, bricks and boxes, where which plane is crossed first is a tie; and from lattice points within bricks.
+std::vector<Ray> rays_through_the_lattice() {
+    std::mt19937 random(17);
+    const float h = 0.03f;
+    std::vector<Ray> out;
+    for (int i = 0; i < 30000; ++i) {
+        const auto side = [&] { return float(int(random() % 5) - 2) * 0.5f; };
+        vec3 d{side(), side(), side()};
+        if (i % 3 == 0) d = {d.x < 0 ? -1.0f : 1.0f, d.y < 0 ? -1.0f : 1.0f, d.z < 0 ? -1.0f : 1.0f};
+        if (dot(d, d) == 0) d.x = 1;
+        const float nudge = i % 4 == 0 ? 1e-6f : 0.0f;
+        const auto texel = [&] { return float(int(random() % 61) - 30) + nudge * float(int(random() % 5) - 2); };
+        const vec3 to{texel() * h, texel() * h, texel() * h};
+        const float steps = i % 2 == 0 ? 0.0f : float(random() % 60) * h;
+        out.push_back({.origin = to - d * steps, .direction = normalize(d)});
+    }
+    return out;
+}
+
+TEST_P(WideInEachFormat, RaysThroughEdgesAndCornersHaveTheBitsOfTheScalarMarch) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const std::vector<Ray> rays = rays_through_the_lattice();
+    const float h = bricks.field().grid().voxel_size;
+    std::vector<MarchHit> one(rays.size()), wide(rays.size());
+    int hits = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        const vec3& o = rays[i].origin;
+        one[i] =
+            bricks.march(texel_ray_of({double(o.x), double(o.y), double(o.z)}, rays[i].direction, h), 0, kFarVoxels);
+        hits += one[i].state == kMarchHit;
+    }
+    EXPECT_GT(hits, 3000);
+    for (const sdf::Isa isa : isas()) {
+        bricks.march(rays, wide.data(), isa);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            ASSERT_EQ(wide[i].state, one[i].state) << "isa " << int(isa) << " ray " << i;
+            ASSERT_EQ(std::bit_cast<uint32_t>(wide[i].t), std::bit_cast<uint32_t>(one[i].t)) << "ray " << i;
+            ASSERT_EQ(wide[i].slot, one[i].slot) << "ray " << i;
+            ASSERT_EQ(wide[i].voxel, one[i].voxel) << "ray " << i;
+            ASSERT_EQ(wide[i].p, one[i].p) << "ray " << i;
+        }
+    }
+}
+
 TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
     std::vector<Edit> edits = mixed();
     HostBricks bricks = bricks_of(GetParam(), edits);
@@ -180,26 +231,56 @@ TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
     for (size_t i = 0; i < rays.size(); ++i) EXPECT_EQ(after[i].t, before[i].t);
 }
 
-TEST(Wide, ASolidMaskNamesTheVoxelsWithASolidCorner) {
-    std::mt19937 random(5);
-    for (const int texel_bytes : {1, 2}) {
-        std::vector<std::byte> texels(size_t(kBrickTexelCount * texel_bytes));
-        std::vector<float> values(kBrickTexelCount);
-        for (size_t i = 0; i < values.size(); ++i) {
-            const float d = random() % 30 == 0 ? -1.0f : random() % 90 == 0 ? 0.0f : 2.0f;
-            const uint32_t code = texel_bytes == 2 ? half_code(d) : snorm8_code(d);
-            std::memcpy(texels.data() + i * size_t(texel_bytes), &code, size_t(texel_bytes));
-            values[i] = d;
+// Tables are made from those of the last state that was asked, whoever still holds it.
+TEST_P(WideInEachFormat, AnswersFollowEditsWhoeverAskedBetween) {
+    std::mt19937 random(11);
+    std::uniform_real_distribution<float> at(-0.8f, 0.8f), size(0.02f, 0.15f);
+    std::vector<Edit> edits = mixed();
+    HostBricks bricks = bricks_of(GetParam(), edits);
+    const Cloud c = cloud();
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    struct Kept {
+        HostBricks bricks;
+        std::vector<float> distances;
+    };
+    std::vector<Kept> kept;
+    std::vector<uint32_t> rows;
+    std::vector<float> now(c.x.size()), anew(c.x.size());
+    std::vector<MarchHit> hits(rays.size()), hits_anew(rays.size());
+    for (int round = 0; round < 24; ++round) {
+        sdf::Program program = bricks.field().program();
+        RowChange change;
+        if (round % 5 == 4) {  // the last edit goes again
+            program.remove(rows.back());
+            change.removed = rows.back();
+            rows.pop_back();
+            edits.pop_back();
+        } else {
+            edits.push_back(edit(Sphere{.radius = size(random)}, {at(random), at(random), at(random)},
+                                 round % 2 == 0 ? Op::Subtract : Op::Union));
+            change.inserted = *sdf::insert(program, edits.back(), {}, {}, sdf::order_at(edits.size()), 0);
+            rows.push_back(change.inserted);
         }
-        std::byte mask[kSolidMaskBytes];
-        solid_mask(texels.data(), texel_bytes, mask);
-        for (int v = 0; v < 343; ++v) {
-            const int x = v % 7, y = v / 7 % 7, z = v / 49;
-            bool solid = false;
-            for (int c = 0; c < 8; ++c)
-                solid = solid || values[size_t(((z + (c >> 2)) * 8 + y + (c >> 1 & 1)) * 8 + x + (c & 1))] <= 0;
-            EXPECT_EQ((int(mask[z * 8 + y]) >> x & 1) != 0, solid) << x << " " << y << " " << z;
+        ASSERT_TRUE(bricks.update(std::make_shared<const sdf::Program>(program), std::span(&change, 1)));
+        if (round % 3 == 1) continue;  // nobody asks
+        bricks.distances(c.points(), now.data());
+        bricks.march(rays, hits.data());
+        const HostBricks fresh = HostBricks::bake(bricks.shared_field());
+        fresh.distances(c.points(), anew.data());
+        fresh.march(rays, hits_anew.data());
+        for (size_t i = 0; i < now.size(); ++i)
+            ASSERT_EQ(std::bit_cast<uint32_t>(now[i]), std::bit_cast<uint32_t>(anew[i])) << "round " << round;
+        for (size_t i = 0; i < rays.size(); ++i) {
+            ASSERT_EQ(hits[i].state, hits_anew[i].state) << "round " << round << " ray " << i;
+            ASSERT_EQ(hits[i].t, hits_anew[i].t) << "round " << round << " ray " << i;
+            ASSERT_EQ(hits[i].slot, hits_anew[i].slot) << "round " << round << " ray " << i;
         }
+        if (round % 4 == 0) kept.push_back({bricks, now});
+    }
+    ASSERT_GT(kept.size(), 3u);
+    for (const Kept& one : kept) {  // copies still answer for what they were
+        one.bricks.distances(c.points(), now.data());
+        EXPECT_EQ(now, one.distances);
     }
 }
 

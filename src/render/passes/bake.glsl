@@ -65,7 +65,8 @@ void main() {
         uint word = 0u;
         for (uint y = 0u; y < 4u - (row & 1u); ++y) {
             uint at = first + y;
-            word |= solid_voxels(solid_rows[at], solid_rows[at + 1u], solid_rows[at + 8u], solid_rows[at + 9u]) << (7u * y);
+            uint any = solid_rows[at] | solid_rows[at + 1u] | solid_rows[at + 8u] | solid_rows[at + 9u];
+            word |= ((any | (any >> 1u)) & 127u) << (8u * y);
         }
         tables[slot * uint(kBrickTableWords) + uint(kPaletteSize) + row] = word;
     }

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT
+#include "field/solid.h"
+
+#include <bit>
+#include <cstring>
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
+
+namespace kiln::field {
+
+std::array<Slice, 8> solid_texels(const std::byte* codes, int texel_bytes) {
+    std::array<Slice, 8> out{};
+#ifdef __SSE2__
+    const __m128i zero = _mm_setzero_si128();
+    const auto at = [&](int block) { return _mm_loadu_si128(reinterpret_cast<const __m128i*>(codes) + block); };
+    for (int z = 0; z < 8; ++z) {
+        Slice empty = 0;
+        for (int pair = 0; pair < 4; ++pair) {
+            const int block = z * 4 + pair;
+            const __m128i above = texel_bytes == 2 ? _mm_packs_epi16(_mm_cmpgt_epi16(at(2 * block), zero),
+                                                                     _mm_cmpgt_epi16(at(2 * block + 1), zero))
+                                                   : _mm_cmpgt_epi8(at(block), zero);
+            empty |= Slice(uint32_t(_mm_movemask_epi8(above))) << 16 * pair;
+        }
+        out[size_t(z)] = ~empty;
+    }
+#else
+    for (size_t z = 0; z < 8; ++z) {
+        for (size_t i = 0; i < 64; ++i) {
+            const size_t texel = z * 64 + i;
+            bool empty = int8_t(codes[texel * size_t(texel_bytes)]) > 0;
+            if (texel_bytes == 2) {
+                int16_t code;
+                std::memcpy(&code, codes + 2 * texel, 2);
+                empty = code > 0;
+            }
+            out[z] |= Slice(!empty) << i;
+        }
+    }
+#endif
+    return out;
+}
+
+SolidVoxels solid_voxels(const std::array<Slice, 8>& texels) {
+    SolidVoxels out;
+    std::array<Slice, 7> voxels;
+    Slice all = 0;
+    int first_z = 7, last_z = 0;
+    for (size_t z = 0; z < 7; ++z) {
+        Slice any = texels[z] | texels[z + 1];
+        any |= any >> 8;
+        any |= any >> 1;
+        voxels[z] = any & 0x007f7f7f7f7f7f7fu;
+        all |= voxels[z];
+        if (voxels[z] == 0) continue;
+        first_z = first_z == 7 ? int(z) : first_z;
+        last_z = int(z);
+    }
+    if (all == 0) return out;
+    std::memcpy(out.rows.data(), voxels.data(), sizeof voxels);
+    const int first_y = std::countr_zero(all) / 8, last_y = 7 - std::countl_zero(all) / 8;
+    Slice columns = all | all >> 32;
+    columns |= columns >> 16;
+    columns = (columns | columns >> 8) & 0x7f;
+    out.box =
+        solid_box({std::countr_zero(columns), first_y, first_z}, {63 - std::countl_zero(columns), last_y, last_z});
+    return out;
+}
+
+}  // namespace kiln::field

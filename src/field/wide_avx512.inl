@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: MIT
+// One register of AVX-512 (F, BW, DQ, VL): 16 lanes. Included inside a namespace.
+
+constexpr int kLanes = 16;
+typedef float F __attribute__((vector_size(64)));
+typedef int32_t I __attribute__((vector_size(64)));
+using M = __mmask16;
+
+static inline __m512 f(F v) { return (__m512)v; }
+static inline __m512i i(I v) { return (__m512i)v; }
+
+static inline M lt(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_LT_OQ); }
+static inline M le(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_LE_OQ); }
+static inline M eq(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_EQ_OQ); }
+static inline M lt(I a, I b) { return _mm512_cmplt_epi32_mask(i(a), i(b)); }
+static inline M eq(I a, I b) { return _mm512_cmpeq_epi32_mask(i(a), i(b)); }
+static inline F select(M m, F a, F b) { return (F)_mm512_mask_blend_ps(m, f(b), f(a)); }
+static inline I select(M m, I a, I b) { return (I)_mm512_mask_blend_epi32(m, i(b), i(a)); }
+static inline M all() { return M(0xffff); }
+static inline M none() { return M(0); }
+static inline bool any(M m) { return m != 0; }
+static inline M both(M a, M b) { return M(a & b); }
+static inline M either(M a, M b) { return M(a | b); }
+static inline M without(M a, M b) { return M(a & ~b); }
+static inline F min(F a, F b) { return (F)_mm512_min_ps(f(b), f(a)); }  // as std::min
+static inline F max(F a, F b) { return (F)_mm512_max_ps(f(b), f(a)); }
+static inline F floor(F a) { return (F)_mm512_roundscale_ps(f(a), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+static inline F sqrt(F a) { return (F)_mm512_sqrt_ps(f(a)); }
+static inline I gather_bytes(const void* base, I index) { return (I)_mm512_i32gather_epi32(i(index), base, 1); }
+static inline int count(M m) { return __builtin_popcount(m); }
+static inline uint32_t bits(M m) { return m; }
+
+struct Pointers {
+    __m512i low, high;  // of the first and the last eight lanes
+};
+static inline Pointers gather_pages(const WidePage* const* table, I index) {
+    return {_mm512_i32gather_epi64(_mm512_castsi512_si256(i(index)), table, 8),
+            _mm512_i32gather_epi64(_mm512_extracti64x4_epi64(i(index), 1), table, 8)};
+}
+static inline Pointers moved(const Pointers& p, I bytes) {
+    return {_mm512_add_epi64(p.low, _mm512_cvtepi32_epi64(_mm512_castsi512_si256(i(bytes)))),
+            _mm512_add_epi64(p.high, _mm512_cvtepi32_epi64(_mm512_extracti64x4_epi64(i(bytes), 1)))};
+}
+static inline Pointers gather_entries(const Pointers& at, I& flags) {
+    const __m512i low = _mm512_i64gather_epi64(at.low, nullptr, 1), high = _mm512_i64gather_epi64(at.high, nullptr, 1);
+    const __m512i odd = _mm512_setr_epi32(1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+    flags = (I)_mm512_permutex2var_epi32(low, odd, high);
+    const __m512i address = _mm512_set1_epi64(int64_t(kWideAddress));
+    return {_mm512_and_si512(low, address), _mm512_and_si512(high, address)};
+}
+template <int kBytes>
+static inline I gather_from(const Pointers& p) {
+    const void* const base = reinterpret_cast<const void*>(ptrdiff_t(kBytes));
+    const __m256i low = _mm512_i64gather_epi32(p.low, base, 1), high = _mm512_i64gather_epi32(p.high, base, 1);
+    return (I)_mm512_inserti64x4(_mm512_castsi256_si512(low), high, 1);
+}
+
+#include "field/wide_vectors.inl"
