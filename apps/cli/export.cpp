@@ -2,6 +2,7 @@
 // kiln export SCENE -o OUT: the surface as a mesh.
 
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -98,7 +99,7 @@ int export_mesh(const Options& o) {
     const Stopwatch total;
     Progress progress;
     progress.stage("loading " + o.scene);
-    const auto world = World::load(o.scene);
+    const auto world = load_scene(o.scene, o.quiet);
     if (!world) return progress.stage(""), fail(world.error());
     progress.stage("meshing");
     const Stopwatch meshing;

@@ -3,6 +3,7 @@
 #include "cli/picture.h"
 
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 
 #include <kiln/world.h>
@@ -82,7 +83,7 @@ void introduce(const RenderStats& stats) {
 }
 
 std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame,
-                   double load, double total) {
+                   const World& world, double load, double total) {
     std::string passes;
     for (const auto& [name, ms] : stats.passes)
         passes += (passes.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(ms);
@@ -97,6 +98,7 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
     json.number("evaluations", double(stats.evaluations)).number("atlas_bytes", double(stats.atlas_bytes));
     json.number("host_bytes", double(stats.host_bytes)).number("pipelines_created", double(stats.pipelines_created));
     json.number("coarsened", frame.coarsened).number("load_s", load).number("total_s", total);
+    add_journal(json, world);
     return json.line();
 }
 
@@ -110,7 +112,7 @@ int render_picture(const PictureOptions& o) {
     const Stopwatch total;
     Progress progress;
     progress.stage("loading " + o.scene);
-    auto world = World::load(o.scene);
+    auto world = load_scene(o.scene, o.quiet);
     if (!world) return progress.stage(""), fail(world.error());
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);
@@ -151,7 +153,7 @@ int render_picture(const PictureOptions& o) {
             say("next     kiln render " + o.scene + " -o " + o.scene + ".exr   ·   kiln demo --list   ·   kiln doctor");
     }
     if (!o.json) return kDone;
-    (void)put(report(o, *settings, stats, *frame, load, total.seconds()));
+    (void)put(report(o, *settings, stats, *frame, *world, load, total.seconds()));
     return finish_data();
 }
 

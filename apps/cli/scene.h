@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: MIT
+// Loading a scene for a verb: with its journal, which is told on stderr and in reports.
+#pragma once
+
+#include "cli/json.h"
+
+#include <kiln/world.h>
+
+#include <string>
+
+namespace kiln::cli {
+
+/// World::load(), and a line on stderr where a journal added something or could not be read to its end.
+Result<World> load_scene(const std::string& path_or_name, bool quiet = false);
+/// "journal": {…} where there is one to tell of.
+void add_journal(Json& json, const World& world);
+
+}  // namespace kiln::cli
