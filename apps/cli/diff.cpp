@@ -32,13 +32,14 @@ int diff(const Options& o) {
 
 void add_diff(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App* verb = app.add_subcommand("diff",
-                                        "Tells how two scenes differ, by the ids of their edits.\n\n"
-                                        "Lines begin with + (only in B), - (only in A), ~ (changed) or < (moved). The exit code is 0\n"
-                                        "when the scenes are the same, 1 when they differ, 3 when one cannot be read.\n\n"
-                                        "Examples:\n"
-                                        "  kiln diff before.kiln.json after.kiln.json\n"
-                                        "  kiln diff potter my-potter.kiln.json --json");
+    CLI::App* verb = app.add_subcommand(
+        "diff",
+        "Tells how two scenes differ, by the ids of their edits.\n\n"
+        "Lines begin with + (only in B), - (only in A), ~ (changed) or < (moved). The exit code is 0\n"
+        "when the scenes are the same, 1 when they differ, 3 when one cannot be read.\n\n"
+        "Examples:\n"
+        "  kiln diff before.kiln.json after.kiln.json\n"
+        "  kiln diff potter my-potter.kiln.json --json");
     verb->add_option("A", o->a, "a scene file, or a bundled scene's name")->required();
     verb->add_option("B", o->b, "another")->required();
     verb->add_flag("--json", o->json, "one object, on stdout");

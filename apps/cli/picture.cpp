@@ -112,7 +112,7 @@ int render_picture(const PictureOptions& o) {
     const Stopwatch total;
     Progress progress;
     progress.stage("loading " + o.scene);
-    auto world = load_scene(o.scene, o.quiet);
+    auto world = World::load(o.scene);
     if (!world) return progress.stage(""), fail(world.error());
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);
@@ -138,6 +138,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("");
 
     if (!o.quiet) {
+        tell_journal(*world);
         if (o.transcript) introduce(stats);
         std::string later;
         for (const std::string& section : world->not_drawn_yet()) later += (later.empty() ? "" : ", ") + section;

@@ -6,10 +6,13 @@
 
 namespace kiln::cli {
 
-Result<World> load_scene(const std::string& path_or_name, bool quiet) {
+void tell_journal(const World& world) {
+    if (const auto report = world.journal_report()) say(report->sentence());
+}
+
+Result<World> load_scene(const std::string& path_or_name) {
     auto world = World::load(path_or_name);
-    if (!world || quiet) return world;
-    if (const auto report = world->journal_report()) say(report->sentence());
+    if (world) tell_journal(*world);
     return world;
 }
 

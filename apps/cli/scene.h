@@ -10,8 +10,10 @@
 
 namespace kiln::cli {
 
-/// World::load(), and a line on stderr where a journal added something or could not be read to its end.
-Result<World> load_scene(const std::string& path_or_name, bool quiet = false);
+/// A line on stderr where a journal added something to the scene, or could not be read to its end.
+void tell_journal(const World& world);
+/// World::load(), told.
+Result<World> load_scene(const std::string& path_or_name);
 /// "journal": {…} where there is one to tell of.
 void add_journal(Json& json, const World& world);
 

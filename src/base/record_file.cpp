@@ -66,7 +66,7 @@ Records read_records(std::string_view bytes) {
     if (bytes.empty()) return out;
     if (bytes.size() < kHeaderBytes || !bytes.starts_with(kMagic) ||
         take<uint64_t>(bytes, 24) != hash64(bytes.substr(0, 24))) {
-        out.fault = bytes.size() < kHeaderBytes       ? "its header is cut short"
+        out.fault = bytes.size() < kHeaderBytes  ? "its header is cut short"
                     : !bytes.starts_with(kMagic) ? "it does not begin as a journal does"
                                                  : "its header is damaged";
         return out;
@@ -102,10 +102,11 @@ Records read_records(std::string_view bytes) {
 struct RecordFile::Impl {
     std::string path;
     int fd = -1;
-    uint64_t end = 0;       // bytes; what lies behind is a write that failed
-    uint32_t sequence = 1;  // of the next record
-    uint64_t checksum = 0;  // of the last
-    bool torn = false;      // there may be something behind `end`
+    bool held = false;            // the lock is ours
+    uint64_t end = 0;             // bytes; what lies behind is a write that failed
+    uint32_t sequence = 1;        // of the next record
+    uint64_t checksum = 0;        // of the last
+    bool torn = false;            // there may be something behind `end`
     std::optional<Hash128> owed;  // the header that restart() could not write
     std::string buffer;
 
@@ -125,7 +126,7 @@ struct RecordFile::Impl {
         if (flusher.joinable()) flusher.join();
         if (fd < 0) return;
         struct stat info {};
-        if (sequence == 1 && fstat(fd, &info) == 0 && info.st_size <= off_t(kHeaderBytes)) unlink(path.c_str());
+        if (held && sequence == 1 && fstat(fd, &info) == 0 && info.st_size <= off_t(kHeaderBytes)) unlink(path.c_str());
         close(fd);  // gives the lock back
     }
 
@@ -197,10 +198,13 @@ Result<RecordFile> RecordFile::open(const std::string& path, std::string& bytes)
         if (impl->fd < 0) return failure(path, errno);
         if (flock(impl->fd, LOCK_EX | LOCK_NB) == 0) {
             // Its last holder may have taken the name away between the two calls.
-            struct stat ours {}, named {};
+            struct stat ours {
+            }, named{};
             if (fstat(impl->fd, &ours) == 0 && stat(path.c_str(), &named) == 0 && ours.st_ino == named.st_ino &&
-                ours.st_dev == named.st_dev)
+                ours.st_dev == named.st_dev) {
+                impl->held = true;
                 break;
+            }
         } else if (errno != EWOULDBLOCK) {
             return failure(path, errno);
         } else if (attempt >= 5) {

@@ -24,11 +24,11 @@ inline constexpr size_t kRecordHeaderBytes = 16;
 /// What the bytes of such a file hold.
 struct Records {
     bool has_header = false;
-    Hash128 base;                           ///< what the file says it continues
+    Hash128 base;                            ///< what the file says it continues
     std::vector<std::string_view> payloads;  ///< in the bytes; the record's sequence is its index + 1
-    size_t good_bytes = 0;                  ///< header and records up to the first that is broken; 0 without a header
-    uint64_t checksum = 0;                  ///< of the last good one
-    std::string fault;                      ///< why the rest is not taken; empty when there is no rest
+    size_t good_bytes = 0;                   ///< header and records up to the first that is broken; 0 without a header
+    uint64_t checksum = 0;                   ///< of the last good one
+    std::string fault;                       ///< why the rest is not taken; empty when there is no rest
 };
 /// Reads any bytes. The payloads look into them.
 Records read_records(std::string_view bytes);

@@ -42,8 +42,8 @@ private:
         out_.kind = CommandKind(kind);
         const bool ordered = out_.kind == CommandKind::Add || out_.kind == CommandKind::Reorder;
         for (JsonIndex c = doc_.next(what); c < doc_.next(at); c = doc_.next(c)) {
-            const bool names_edit = (ordered && doc_.key(c) == "before") ||
-                                    (out_.kind == CommandKind::Change && doc_.key(c) == "was");
+            const bool names_edit =
+                (ordered && doc_.key(c) == "before") || (out_.kind == CommandKind::Change && doc_.key(c) == "was");
             if (!names_edit) {
                 return in_.fail_at_key(c, ordered ? formatted("unknown key; {} may have \"before\"", kKeys[kind])
                                           : out_.kind == CommandKind::Change ? "unknown key; change may have \"was\""

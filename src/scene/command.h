@@ -18,7 +18,18 @@
 
 namespace kiln::scene {
 
-enum class CommandKind : uint8_t { Add, Change, Remove, Reorder, Material, Object, Field, Lights, Environment, Cameras };
+enum class CommandKind : uint8_t {
+    Add,
+    Change,
+    Remove,
+    Reorder,
+    Material,
+    Object,
+    Field,
+    Lights,
+    Environment,
+    Cameras
+};
 /// The key that says which it is: "add", …, "materials", ….
 std::string_view command_key(CommandKind kind);
 

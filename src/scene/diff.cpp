@@ -89,7 +89,8 @@ private:
     struct Field {
         std::string key, a, b;
     };
-    std::vector<Field> differing(std::optional<JsonIndex> a, std::optional<JsonIndex> b, const scene::Table* table) const {
+    std::vector<Field> differing(std::optional<JsonIndex> a, std::optional<JsonIndex> b,
+                                 const scene::Table* table) const {
         std::vector<Field> out;
         const auto absent = [&](std::string_view key, const std::string& other) {
             const std::string is_default = default_of(table, key);
@@ -176,7 +177,8 @@ private:
         }
         // Only the order of edits has a meaning, and of cameras which is first.
         if (row.name == "edits") order(bs, in_a, moved);
-        if (row.name == "cameras" && !as.empty() && !bs.empty() && as[0].name != bs[0].name && in_a.contains(bs[0].name)) {
+        if (row.name == "cameras" && !as.empty() && !bs.empty() && as[0].name != bs[0].name &&
+            in_a.contains(bs[0].name)) {
             line(row.name, "< " + bs[0].name + ": is the first now");
             moved.push_back({{"id", bs[0].name}, {"before", as[0].name}});
         }

@@ -22,9 +22,10 @@ struct Change {
     enum class What : uint8_t { Presence, Content, Order, Material, Object, Field, Lights, Environment, Cameras };
     using Cameras = std::vector<std::pair<std::string, Camera>>;
     /// Nothing: the thing is there now and would be away, or (Order) has no content of its own.
-    using Held = std::variant<std::monostate, std::unique_ptr<Edit>, std::unique_ptr<std::pair<std::string, Material>>,
-                              std::unique_ptr<Object>, std::unique_ptr<FieldSettings>, std::unique_ptr<std::vector<Light>>,
-                              std::unique_ptr<std::optional<Environment>>, std::unique_ptr<Cameras>>;
+    using Held =
+        std::variant<std::monostate, std::unique_ptr<Edit>, std::unique_ptr<std::pair<std::string, Material>>,
+                     std::unique_ptr<Object>, std::unique_ptr<FieldSettings>, std::unique_ptr<std::vector<Light>>,
+                     std::unique_ptr<std::optional<Environment>>, std::unique_ptr<Cameras>>;
 
     What what = What::Presence;
     JsonIndex place = SceneData::kNowhere;  ///< of an edit that is away
@@ -45,9 +46,9 @@ public:
 
     struct Step {
         uint32_t parent = 0;
-        uint32_t redo = 0;                 ///< the child that was last left or made; 0: none
-        uint32_t first = 0, count = 0;     ///< its changes
-        uint32_t sequence = kNoSequence;   ///< by which the journal knows the state after it
+        uint32_t redo = 0;                ///< the child that was last left or made; 0: none
+        uint32_t first = 0, count = 0;    ///< its changes
+        uint32_t sequence = kNoSequence;  ///< by which the journal knows the state after it
     };
 
     std::vector<Step> steps{Step{}};

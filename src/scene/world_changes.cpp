@@ -220,7 +220,7 @@ Result<void> World::Impl::journal_change(const World& world, const Change& chang
     const std::string command = command_of(world, change);
     // What code assigned has not been checked by anyone yet, and the journal must be readable.
     if (change.what >= What::Field)
-        if (auto read = scene::read_command(command, "settings", names()); !read)
+        if (auto read = scene::read_command(command, command.substr(2, command.find('"', 2) - 2), names()); !read)
             return Error{read.error().message, ErrorKind::Usage};
     if (log->depth > 0 && log->open_sequence == scene::Log::kNoSequence) {
         const uint32_t begin = journal->file.next_sequence();
@@ -376,7 +376,8 @@ Result<void> World::Impl::apply(World& world, scene::Command command) {
         const uint32_t number = number_of(data.material_numbers, command.id);
         if (!command.material && number == UINT32_MAX)
             return Error{command.id + ": there is no such material to take away", ErrorKind::Usage};
-        Change change{.what = What::Material, .id = {number == UINT32_MAX ? uint32_t(data.materials.size()) : number, 0}};
+        Change change{.what = What::Material,
+                      .id = {number == UINT32_MAX ? uint32_t(data.materials.size()) : number, 0}};
         if (command.material) {
             scene::make_canonical(*command.material);
             change.held = std::make_unique<std::pair<std::string, Material>>(command.id, *command.material);
@@ -389,8 +390,7 @@ Result<void> World::Impl::apply(World& world, scene::Command command) {
             return added ? Result<void>() : Result<void>(added.error());
         }
         const uint32_t number = number_of(data.object_numbers, command.id);
-        if (number == UINT32_MAX)
-            return Error{command.id + ": there is no such object to take away", ErrorKind::Usage};
+        if (number == UINT32_MAX) return Error{command.id + ": there is no such object to take away", ErrorKind::Usage};
         return make(world, Change{.what = What::Object, .id = {number, 0}});
     }
     case CommandKind::Field:

@@ -295,6 +295,10 @@ std::string World::inspect_json() const {
     out["cameras"] = camera_names;
     out["not_drawn_yet"] = data.undrawn;
     const std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    if (impl_->report) {
+        const JournalReport& r = *impl_->report;
+        out["journal"] = {{"file", r.file}, {"commands", r.commands}, {"dropped_bytes", r.dropped_bytes}};
+    }
     out["bounds"] = box_json(program->bounds);
     out["unbounded"] = program->unbounded;
     out["instructions"] = program->tape().size();

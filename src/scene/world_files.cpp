@@ -66,7 +66,7 @@ std::string side_file(const std::string& journal) {
 
 void discard_unfinished_files() noexcept { AtomicFile::remove_temporaries_from_signal(); }
 
-Result<World> World::load(const std::string& path_or_name) {
+Result<World> World::load(const std::string& path_or_name, int workers) {
     struct stat info {};
     const bool is_name = path_or_name.find('/') == std::string::npos && path_or_name.find('.') == std::string::npos;
     if (is_name && ::stat(path_or_name.c_str(), &info) != 0) {
@@ -99,7 +99,7 @@ Result<World> World::load(const std::string& path_or_name) {
         }
         World world;
         Impl& m = *world.impl_;
-        if (auto read = m.read_journaled(world, std::move(*text), path_or_name, *bytes, records, 0); !read)
+        if (auto read = m.read_journaled(world, std::move(*text), path_or_name, *bytes, records, workers); !read)
             return read.error();
         if (held) {  // what is behind the last record may be one that is being written
             m.report->dropped_bytes = 0;
@@ -266,7 +266,7 @@ Result<void> World::Impl::read_journaled(World& world, std::string text, const s
     return get_ready(world);
 }
 
-Result<World> World::open(const std::string& path) {
+Result<World> World::open(const std::string& path, int workers) {
     auto first = read_file(path);  // whether it is there at all, before a journal is made beside it
     if (!first) return first.error();
     std::string bytes;
@@ -278,7 +278,8 @@ Result<World> World::open(const std::string& path) {
     Records records = read_records(bytes);
     World world;
     Impl& m = *world.impl_;
-    if (auto read = m.read_journaled(world, std::move(*text), path, bytes, records, 0); !read) return read.error();
+    if (auto read = m.read_journaled(world, std::move(*text), path, bytes, records, workers); !read)
+        return read.error();
     m.keep_log(world);
     JournalReport& report = *m.report;
     const std::string_view dropped = std::string_view(bytes).substr(records.good_bytes);
@@ -358,9 +359,10 @@ std::string JournalReport::sentence() const {
     std::string out;
     if (commands > 0) out = formatted("{}: {} command{} applied", file, commands, commands == 1 ? "" : "s");
     if (dropped_bytes == 0) return out;
-    out += formatted("{}{} byte{} of the journal left out: {}; {}", out.empty() ? file + ": " : ", ", dropped_bytes,
-                     dropped_bytes == 1 ? "" : "s", reason,
-                     kept_in.empty() ? "opening the scene for editing keeps them in a file beside it" : "kept in " + kept_in);
+    out += formatted(
+        "{}{} byte{} of the journal left out: {}; {}", out.empty() ? file + ": " : ", ", dropped_bytes,
+        dropped_bytes == 1 ? "" : "s", reason,
+        kept_in.empty() ? "opening the scene for editing keeps them in a file beside it" : "kept in " + kept_in);
     return out;
 }
 
