@@ -65,7 +65,8 @@ private:
                                                                                 if (run_.fault()) return s;
                                                                                 live = work_.hash();
                                                                                 const auto again = work_.reopen();
-                                                                                if (!again) return run_.fail(again.error()), s;
+                                                                                if (!again)
+                                                                                    return run_.fail(again.error()), s;
                                                                                 read = *again;
                                                                                 return s;
                                                                             }});

@@ -48,17 +48,20 @@ std::vector<Item> items_of(const JsonDocument& doc, std::string_view section) {
     return out;
 }
 
-// Of a row of the format's tables, what leaving the key out means; empty where it has no such text.
-std::string default_of(const scene::Table* table, std::string_view key) {
-    const scene::KeyRow* const row = table ? scene::find_row(*table, key) : nullptr;
-    if (row == nullptr) return {};
-    if (row->type == scene::KeyType::Bool) return "false";
-    if (row->type != scene::KeyType::Numbers) return {};
-    JsonDocument one;
-    if (row->numbers.arity > 1) one.open(JsonType::Array);
-    for (int k = 0; k < row->numbers.arity; ++k) one.add_float(row->numbers.defaults[size_t(k)]);
-    if (row->numbers.arity > 1) one.close();
-    return one.line();
+// Whether a value says what leaving its key out means, by the format's tables.
+bool is_default(const scene::Table* table, const JsonDocument& doc, JsonIndex at) {
+    const scene::KeyRow* const row = table ? scene::find_row(*table, doc.key(at)) : nullptr;
+    if (row == nullptr) return false;
+    if (row->type == scene::KeyType::Bool) return doc.is(at, JsonType::False);
+    if (row->type != scene::KeyType::Numbers) return false;
+    const bool list = doc.is(at, JsonType::Array);
+    JsonIndex c = list ? doc.first(at) : at;
+    for (int k = 0; k < row->numbers.arity; ++k) {
+        if (list ? c == doc.next(at) : k > 0) return false;
+        if (!doc.is(c, JsonType::Number) || float(doc.number(c)) != row->numbers.defaults[size_t(k)]) return false;
+        if (list) c = doc.next(c);
+    }
+    return !list || c == doc.next(at);
 }
 
 class Comparison {
@@ -92,22 +95,18 @@ private:
     std::vector<Field> differing(std::optional<JsonIndex> a, std::optional<JsonIndex> b,
                                  const scene::Table* table) const {
         std::vector<Field> out;
-        const auto absent = [&](std::string_view key, const std::string& other) {
-            const std::string is_default = default_of(table, key);
-            return !is_default.empty() && is_default == other;
-        };
         if (a)
             for (JsonIndex c = a_.first(*a); c < a_.next(*a); c = a_.next(c)) {
                 const auto other = b ? b_.find(*b, a_.key(c)) : std::nullopt;
                 std::string was = text_of(a_, c), is = other ? text_of(b_, *other) : "";
-                if (was != is && (other || !absent(a_.key(c), was)))
+                if (was != is && (other || !is_default(table, a_, c)))
                     out.push_back({std::string(a_.key(c)), std::move(was), std::move(is)});
             }
         if (b)
             for (JsonIndex c = b_.first(*b); c < b_.next(*b); c = b_.next(c)) {
                 if (a && a_.find(*a, b_.key(c))) continue;
                 std::string is = text_of(b_, c);
-                if (!absent(b_.key(c), is)) out.push_back({std::string(b_.key(c)), "", std::move(is)});
+                if (!is_default(table, b_, c)) out.push_back({std::string(b_.key(c)), "", std::move(is)});
             }
         return out;
     }
@@ -137,8 +136,9 @@ private:
     void whole(std::string_view key) {
         const auto a = a_.find(0, key), b = b_.find(0, key);
         const std::string was = a ? text_of(a_, *a) : "", is = b ? text_of(b_, *b) : "";
-        const std::string is_default = default_of(&scene::kSceneTable, key);
-        if (was == is || (was.empty() && is == is_default) || (is.empty() && was == is_default)) return;
+        if (was == is || (!a && is_default(&scene::kSceneTable, b_, *b)) ||
+            (!b && is_default(&scene::kSceneTable, a_, *a)))
+            return;
         line(key, formatted("~ {} -> {}", brief(was), brief(is)));
         report_[std::string(key)] = {{"a", json_of(was)}, {"b", json_of(is)}};
     }

@@ -211,6 +211,9 @@ size_t World::Impl::replay(World& world, const Records& records, const scene::Jo
     keep_log(world);
     log->steps[0].sequence = start.sequence;
     compile_later = true;
+    const auto adds = std::count_if(records.payloads.begin() + ptrdiff_t(start.first), records.payloads.end(),
+                                    [](std::string_view payload) { return payload.starts_with("{\"add\""); });
+    edits.reserve(edits.size() + size_t(adds));
     Replay replay(world, *this, start, records.payloads.size());
     // Texts are read side by side, commands one after another.
     constexpr size_t kBatch = 8192;

@@ -249,7 +249,8 @@ TEST(History, UndoBakesNoMoreThanTheEditDid) {
     World world;
     world.field_settings = {.voxel_size = 0.02f, .cells = 64, .levels = 1, .bounds = Box3{{-2, -2, -2}, {2, 2, 2}}};
     for (int i = 0; i < 200; ++i)
-        ASSERT_TRUE(world.add(ball(0.3f, {float(i % 6) * 0.6f - 1.5f, float(i / 6 % 6) * 0.6f - 1.5f, float(i / 36) * 0.6f - 1.5f})));
+        ASSERT_TRUE(world.add(
+            ball(0.3f, {float(i % 6) * 0.6f - 1.5f, float(i / 6 % 6) * 0.6f - 1.5f, float(i / 36) * 0.6f - 1.5f})));
     History history = world.history();
     ASSERT_TRUE(world.frame());
     const EditId id = world.edits()[100];
@@ -312,7 +313,8 @@ TEST(History, EditsThatNoFileCouldHoldAreRefusedAndOthersMadePlain) {
 
 TEST(HistorySlow, AMillionEditsAndUndosGiveTheirMemoryBack) {
     World world;
-    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(world.add(ball(0.3f, {float(i % 10), float(i / 10 % 10), float(i / 100)})));
+    for (int i = 0; i < 1000; ++i)
+        ASSERT_TRUE(world.add(ball(0.3f, {float(i % 10), float(i / 10 % 10), float(i / 100)})));
     RandomChanges random(5);
     const std::string before = world.to_json();
     const auto round = [&](int edits) {

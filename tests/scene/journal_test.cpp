@@ -123,7 +123,8 @@ TEST_F(Journals, HistoryGoesOnWhereTheProcessEnded) {
         while (world.history().steps().size() < 30) {
             const size_t before = world.history().steps().size();
             (void)random.one(world);
-            if (world.history().steps().size() == before + 1) states.resize(before + 1), states.push_back(world.to_json());
+            if (world.history().steps().size() == before + 1)
+                states.resize(before + 1), states.push_back(world.to_json());
         }
         ASSERT_TRUE(world.history().go_to(7));
     }
@@ -215,13 +216,13 @@ TEST_F(Journals, AKillAtAnyPointOfSavingLosesNothing) {
         EXPECT_EQ(loaded(), again.to_json());
     };
     check(kScene, journal_before, text);
-    check(kScene, journal_marked, text);        // marked, not renamed
-    check(scene_after, journal_marked, text);   // renamed, not emptied
-    check(scene_after, "", text);               // emptied, without a header yet
-    check(scene_after, journal_after, text);    // done
+    check(kScene, journal_marked, text);       // marked, not renamed
+    check(scene_after, journal_marked, text);  // renamed, not emptied
+    check(scene_after, "", text);              // emptied, without a header yet
+    check(scene_after, journal_after, text);   // done
     check(scene_after, journal_later, later);
-    check(kScene, journal_on, later);           // the rename failed, and the program went on
-    check(scene_after, journal_on, later);      // the emptying failed, and the program went on
+    check(kScene, journal_on, later);       // the rename failed, and the program went on
+    check(scene_after, journal_on, later);  // the emptying failed, and the program went on
 }
 
 TEST_F(Journals, ABrokenJournalOpensToItsLastGoodCommandAndKeepsTheRest) {
@@ -410,7 +411,8 @@ TEST_F(Journals, WhatARecordCannotDoEndsTheReading) {
         {
             std::string bytes;
             auto file = RecordFile::open(journal_, bytes);
-            ASSERT_TRUE(file && file->resume(read_records(bytes)) && file->append(bad) && file->append("{\"remove\":\"b\"}"));
+            ASSERT_TRUE(file && file->resume(read_records(bytes)) && file->append(bad) &&
+                        file->append("{\"remove\":\"b\"}"));
         }
         const auto read = World::load(scene_);
         ASSERT_TRUE(read) << bad;
@@ -487,7 +489,8 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
         ASSERT_GT(child, 0);
         // Sometimes while it opens, mostly later.
         if (round % 8 != 0)
-            for (int i = 0; told->done == 0 && i < 20000; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+            for (int i = 0; told->done == 0 && i < 20000; ++i)
+                std::this_thread::sleep_for(std::chrono::milliseconds(1));
         std::this_thread::sleep_for(std::chrono::microseconds(random() % uint32_t(most_us)));
         ::kill(child, SIGKILL);
         int status = 0;

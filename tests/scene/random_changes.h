@@ -61,7 +61,9 @@ public:
         const std::vector<EditId> ids = world.edits();
         const auto any = [&] { return ids[size_t(below(int(ids.size())))]; };
         const int what = ids.empty() ? 0 : below(23);
-        if (what < 8) return bool(below(3) ? world.add(edit(world, materials_)) : world.insert(edit(world, materials_), ids.empty() ? EditId{} : any()));
+        if (what < 8)
+            return bool(below(3) ? world.add(edit(world, materials_))
+                                 : world.insert(edit(world, materials_), ids.empty() ? EditId{} : any()));
         if (what < 14) return bool(world.change(any(), edit(world, materials_)));
         if (what < 17) return bool(world.remove(any()));
         if (what < 19) return bool(world.reorder(any(), below(3) ? any() : EditId{}));
