@@ -224,6 +224,15 @@ Result<RecordFile> RecordFile::open(const std::string& path, std::string& bytes)
         bytes.append(part.data(), size_t(n));
     }
     impl->end = bytes.size();
+    if (bytes.empty()) {  // perhaps new: its name must be on the disk before a record counts as being there
+        const size_t slash = path.rfind('/');
+        const int folder = ::open(slash == std::string::npos ? "." : path.substr(0, slash + 1).c_str(),
+                                  O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+        if (folder >= 0) {
+            fsync(folder);
+            close(folder);
+        }
+    }
     return RecordFile(std::move(impl));
 }
 

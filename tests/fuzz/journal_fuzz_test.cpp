@@ -48,7 +48,8 @@ TEST(JournalFuzz, EveryTruncationAndFlippedBit) {
 TEST(JournalFuzz, PayloadsThrownAbout) {
     std::mt19937 random(5);
     const Records good = read_records(seeds().front());
-    const char* const tokens[] = {"{", "}", "[", "]", ",", ":", "\"", "null", "-1", "1e38", "\"add\"", "\"id\"", "\"before\"", "{}"};
+    const char* const tokens[] = {"{",    "}",  "[",    "]",       ",",      ":",          "\"",
+                                  "null", "-1", "1e38", "\"add\"", "\"id\"", "\"before\"", "{}"};
     for (int round = 0; round < 2000; ++round) {
         std::string payload(good.payloads[random() % good.payloads.size()]);
         for (unsigned k = 0; k <= random() % 3; ++k) {

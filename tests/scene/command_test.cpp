@@ -26,7 +26,8 @@ World two() {
 TEST(Commands, ChangeAWorldAsItsFunctionsDo) {
     World world = two();
     const EditId a = *world.find_edit("a");
-    ASSERT_TRUE(world.apply("{\"add\": {\"id\": \"c\", \"object\": \"ring\", \"material\": \"clay\"}, \"before\": \"b\"}"));
+    ASSERT_TRUE(
+        world.apply("{\"add\": {\"id\": \"c\", \"object\": \"ring\", \"material\": \"clay\"}, \"before\": \"b\"}"));
     EXPECT_EQ(world.edits()[1], *world.find_edit("c"));
     ASSERT_TRUE(world.apply("{\"change\": {\"id\": \"a\", \"shape\": \"box\", \"op\": \"subtract\"}}"));
     EXPECT_FALSE(world.find(a)->node.material) << "a whole edit: what it does not say is as never said";
@@ -42,7 +43,8 @@ TEST(Commands, ChangeAWorldAsItsFunctionsDo) {
     EXPECT_EQ(world.edits().size(), 2u);
     ASSERT_TRUE(world.apply("{\"materials\": {\"iron\": {\"metallic\": 1}}}"));
     EXPECT_EQ(world.material({1, 0})->metallic, 1);
-    ASSERT_TRUE(world.apply("{\"objects\": {\"two\": {\"children\": [{\"object\": \"ring\"}, {\"shape\": \"sphere\"}]}}}"));
+    ASSERT_TRUE(
+        world.apply("{\"objects\": {\"two\": {\"children\": [{\"object\": \"ring\"}, {\"shape\": \"sphere\"}]}}}"));
     ASSERT_TRUE(world.apply("{\"add\": {\"object\": \"two\"}}"));
     ASSERT_TRUE(world.apply("{\"lights\": [{\"type\": \"point\", \"intensity\": 3}]}"));
     EXPECT_EQ(world.lights.at(0).intensity, 3);
@@ -94,9 +96,9 @@ TEST(Commands, AFileOfThemIsReadByTimeAndItsFaultsHaveLines) {
         std::ofstream(path, std::ios::binary) << text;
         return read_timed_commands(path);
     };
-    const auto commands =
-        read("{\"time\": 2, \"command\": {\"remove\": \"a\"}}\r\n\n{\"command\": {\"add\": {\"id\": \"c\", \"shape\": "
-             "\"sphere\"}}, \"time\": 0.5}\n{\"time\": 2, \"command\": {\"remove\": \"nobody\"}}");
+    const auto commands = read(
+        "{\"time\": 2, \"command\": {\"remove\": \"a\"}}\r\n\n{\"command\": {\"add\": {\"id\": \"c\", \"shape\": "
+        "\"sphere\"}}, \"time\": 0.5}\n{\"time\": 2, \"command\": {\"remove\": \"nobody\"}}");
     ASSERT_TRUE(commands) << commands.error().message;
     ASSERT_EQ(commands->size(), 3u);
     EXPECT_EQ((*commands)[0].time, 0.5);
@@ -139,11 +141,12 @@ std::string lines(const std::string& a, const std::string& b) {
 }
 
 TEST(SceneDiff, NeitherOrderOfKeysNorSpelledOutDefaultsCount) {
-    EXPECT_EQ(lines(scene::scene_with("{\"id\": \"a\", \"shape\": \"sphere\", \"radius\": 1}"),
-                    scene::scene_with("{\"radius\": 1.0, \"op\": \"union\", \"scale\": [1, 1, 1], \"shape\": \"sphere\", "
-                                      "\"id\": \"a\", \"domain\": []}",
-                                      "\"field\": {}, \"physics\": {\"step\": 0.0166666667}, \"materials\": {}")),
-              "");
+    EXPECT_EQ(
+        lines(scene::scene_with("{\"id\": \"a\", \"shape\": \"sphere\", \"radius\": 1}"),
+              scene::scene_with("{\"radius\": 1.0, \"op\": \"union\", \"scale\": [1, 1, 1], \"shape\": \"sphere\", "
+                                "\"id\": \"a\", \"domain\": []}",
+                                "\"field\": {}, \"physics\": {\"step\": 0.0166666667}, \"materials\": {}")),
+        "");
 }
 
 TEST(SceneDiff, SaysWhatIsAddedRemovedChangedAndMoved) {
@@ -155,7 +158,8 @@ TEST(SceneDiff, SaysWhatIsAddedRemovedChangedAndMoved) {
     const std::string b = scene::scene_with(
         "{\"id\": \"a\", \"shape\": \"sphere\", \"radius\": 2}, {\"id\": \"d\", \"shape\": \"box\"}, {\"id\": \"b\", "
         "\"shape\": \"box\"}, {\"id\": \"e\", \"shape\": \"box\"}",
-        "\"materials\": {\"m\": {}, \"n\": {}}, \"cameras\": {\"y\": {}, \"x\": {\"fov_y_deg\": 30}}, \"environment\": {}, "
+        "\"materials\": {\"m\": {}, \"n\": {}}, \"cameras\": {\"y\": {}, \"x\": {\"fov_y_deg\": 30}}, \"environment\": "
+        "{}, "
         "\"field\": {\"voxel_size\": 0.5}, \"bodies\": [{\"id\": \"body\", \"edits\": [\"a\"], \"density\": 6}], "
         "\"wind\": [1, 0, 0]");
     EXPECT_EQ(lines(a, a), "");
