@@ -114,6 +114,26 @@ TEST_F(Journals, WhatIsReadIsTheSameForAnyNumberOfThreads) {
     }
 }
 
+TEST_F(Journals, ARayNamesTheRightEditOfAWorldThatWasReadFromAJournal) {
+    {
+        World world = open();
+        for (int i = 0; i < 5; ++i) {
+            Edit e = ball("e" + std::to_string(i), 0.25f);
+            e.node.transform.position = {float(10 + i), 0, 0};
+            ASSERT_TRUE(world.add(e));
+        }
+        ASSERT_TRUE(world.remove(*world.find_edit("e0")));
+        ASSERT_TRUE(world.reorder(*world.find_edit("e4"), *world.find_edit("a")));
+    }
+    const auto world = World::load(scene_);
+    ASSERT_TRUE(world);
+    for (int i = 1; i < 5; ++i) {
+        const RayHit hit = world->cast({.origin = {float(10 + i), 5, 0}, .direction = {0, -1, 0}});
+        ASSERT_TRUE(hit.hit);
+        EXPECT_EQ(hit.edit, *world->find_edit("e" + std::to_string(i)));
+    }
+}
+
 TEST_F(Journals, HistoryGoesOnWhereTheProcessEnded) {
     std::vector<std::string> states;
     {
