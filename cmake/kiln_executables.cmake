@@ -101,7 +101,7 @@ endfunction()
 # tests/fuzz/X_fuzzer.cpp -> bin/fuzz_X, of libFuzzer (preset fuzz). Of the scene module only the readers: clang 14 knows no parenthesised
 # initialisation of aggregates, which the texts shared with shaders use.
 function(kiln_fuzzers)
-    set(readers format heights_png json_print json_source read_nodes read_values scene_file scene_writer suggest)
+    set(readers command format heights_png json_print json_source read_nodes read_values scene_file scene_writer suggest)
     list(TRANSFORM readers PREPEND ${PROJECT_SOURCE_DIR}/src/scene/)
     list(TRANSFORM readers APPEND .cpp)
     add_library(kiln_readers STATIC ${readers})

@@ -2,6 +2,7 @@
 // kiln export SCENE -o OUT: the surface as a mesh.
 
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -117,6 +118,7 @@ int export_mesh(const Options& o) {
     const MeshReport r = measure(*mesh);
     progress.stage("");
     if (!o.quiet) {
+        tell_journal(*world);
         char line[200];
         std::snprintf(line, sizeof line, "%llu triangles, %llu vertices, %zu parts, %.6g m^3, %.6g m^2, %s",
                       static_cast<unsigned long long>(r.triangles), static_cast<unsigned long long>(r.vertices),
@@ -147,6 +149,7 @@ int export_mesh(const Options& o) {
         .raw("bounds", bounds.object())
         .raw("parts", "[" + parts + "]");
     json.number("mesh_ms", mesh_ms).number("total_ms", total.seconds() * 1000);
+    add_journal(json, *world);
     (void)put(json.line());
     return finish_data();
 }

@@ -2,6 +2,7 @@
 // kiln inspect SCENE: what is in a scene. kiln validate SCENE: whether it is right. kiln schema: what a right one looks like.
 
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -15,7 +16,7 @@ namespace {
 
 struct Options {
     std::string scene;
-    bool json = false;
+    bool json = false, history = false;
 };
 
 // The facts without JSON's brackets and quotes.
@@ -34,16 +35,36 @@ std::string for_people(const std::string& json) {
     return out;
 }
 
+// A line a step: where the world is, what is undone, and after which step each was made where that is not the one above.
+std::string history_for_people(World& world) {
+    const History history = world.history();
+    std::string out;
+    if (const auto report = world.journal_report()) out = "journal " + report->sentence() + "\n";
+    if (history.steps().empty()) return out + "no steps: the scene file holds all\n";
+    for (const HistoryStep& step : history.steps()) {
+        out += step.number == history.now() ? "> " : "  ";
+        out += std::to_string(step.number) + "  " + step.title;
+        if (step.changes > 1) out += " (" + std::to_string(step.changes) + " changes)";
+        if (step.parent + 1 != step.number) out += "  after " + std::to_string(step.parent);
+        out += step.done ? "\n" : "  undone\n";
+    }
+    return out;
+}
+
 int inspect(const Options& o) {
-    auto world = World::load(o.scene);
+    auto world = o.history ? World::load(o.scene) : load_scene(o.scene);
     if (!world) return fail(world.error());
+    if (o.history) {
+        (void)put(o.json ? world->history_json() : history_for_people(*world));
+        return finish_data();
+    }
     const std::string facts = world->inspect_json();
     (void)put(o.json ? facts : for_people(facts));
     return finish_data();
 }
 
 int validate(const Options& o) {
-    auto world = World::load(o.scene);
+    auto world = load_scene(o.scene);
     if (o.json) {
         Json json;
         json.text("scene", o.scene).flag("valid", bool(world));
@@ -53,6 +74,7 @@ int validate(const Options& o) {
             for (const std::string& note : world->model_notes())
                 notes += (notes.empty() ? "" : ", ") + Json::quoted(note);
             if (!notes.empty()) json.raw("models", "[" + notes + "]");
+            add_journal(json, *world);
         }
         if (!world) json.text("error", world.error().message);
         (void)put(json.line());
@@ -73,9 +95,11 @@ void add_inspect(CLI::App& app, Run& run) {
                                         "Tells what is in a scene. Needs no device.\n\n"
                                         "Examples:\n"
                                         "  kiln inspect quarry\n"
-                                        "  kiln inspect my.kiln.json --json");
+                                        "  kiln inspect my.kiln.json --json\n"
+                                        "  kiln inspect my.kiln.json --history      the steps in its journal");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_flag("--json", o->json, "one object, on stdout");
+    verb->add_flag("--history", o->history, "the steps that the scene's journal holds, and which are undone");
     verb->callback([o, &run] { run = [o] { return inspect(*o); }; });
 }
 

@@ -16,9 +16,9 @@
 namespace kiln::cli {
 namespace {
 
-constexpr std::string_view kVerbs[] = {"demo",     "render", "query",  "import",  "export", "inspect",
-                                       "validate", "schema", "doctor", "compare", "bench"};
-constexpr std::string_view kLaterVerbs[] = {"view", "edit", "simulate", "new", "diff"};
+constexpr std::string_view kVerbs[] = {"demo",   "render", "query",   "import", "export", "inspect", "validate",
+                                       "schema", "doctor", "compare", "diff",   "new",    "bench"};
+constexpr std::string_view kLaterVerbs[] = {"view", "edit", "simulate"};
 
 // In the list of verbs only the first line of each description; its own help shows all of it.
 class Help : public CLI::Formatter {
@@ -79,6 +79,8 @@ int run(int argc, char** argv) {
     add_schema(app, verb);
     add_doctor(app, verb);
     add_compare(app, verb);
+    add_diff(app, verb);
+    add_new(app, verb);
     add_export(app, verb);
     add_bench(app, verb);
     try {

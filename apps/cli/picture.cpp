@@ -3,6 +3,7 @@
 #include "cli/picture.h"
 
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 
 #include <kiln/world.h>
@@ -104,7 +105,7 @@ std::string levels_json(const RenderStats& stats) {
 }
 
 std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame,
-                   double load, double total) {
+                   const World& world, double load, double total) {
     std::string passes;
     for (const auto& [name, ms] : stats.passes)
         passes += (passes.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(ms);
@@ -123,6 +124,7 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         .number("load_s", load)
         .number("total_s", total);
     if (!stats.levels.empty()) json.raw("levels", levels_json(stats));
+    add_journal(json, world);
     return json.line();
 }
 
@@ -249,6 +251,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("");
 
     if (!o.quiet) {
+        tell_journal(*world);
         if (o.transcript) introduce(stats);
         std::string later;
         for (const std::string& section : world->not_drawn_yet()) later += (later.empty() ? "" : ", ") + section;
@@ -264,7 +267,7 @@ int render_picture(const PictureOptions& o) {
             say("next     kiln render " + o.scene + " -o " + o.scene + ".exr   ·   kiln demo --list   ·   kiln doctor");
     }
     if (!o.json) return kDone;
-    (void)put(report(o, *settings, stats, *frame, load, total.seconds()));
+    (void)put(report(o, *settings, stats, *frame, *world, load, total.seconds()));
     return finish_data();
 }
 

@@ -2,6 +2,7 @@
 // kiln query SCENE --points FILE: asks the field at points (or along rays) read as CSV; answers as CSV in the same order.
 // Rows are answered in batches, so a pipe may be as long as it likes.
 
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -210,7 +211,7 @@ int query(const Options& o) {
     }
     auto input = Input::open(o.points);
     if (!input) return fail(input.error());
-    auto world = World::load(o.scene);
+    auto world = load_scene(o.scene);
     if (!world) return fail(world.error());
     std::string out = o.rays ? "hit,t,x,y,z,nx,ny,nz,edit\n" : "x,y,z,distance,nx,ny,nz,material\n";
     const WorldView view = world->view();

@@ -20,6 +20,8 @@ void add_validate(CLI::App& app, Run& run);
 void add_schema(CLI::App& app, Run& run);
 void add_doctor(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
+void add_diff(CLI::App& app, Run& run);
+void add_new(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 

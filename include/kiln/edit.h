@@ -11,6 +11,7 @@
 #include <compare>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -120,6 +121,13 @@ struct Object {
     friend bool operator==(const Object&, const Object&) = default;
 };
 
+/// A line around something on the screen.
+struct Outline {
+    vec3 color{1, 0.6f, 0};  ///< scene-linear Rec. 709
+    float width_px = 3;      ///< (0, 64]
+    friend bool operator==(const Outline&, const Outline&) = default;
+};
+
 /// One entry of the world's ordered list. `node.kind` is Shape or Object.
 struct Edit {
     std::string name{};  ///< the scene file's `id`; unique in a world, made up when empty
@@ -130,6 +138,7 @@ struct Edit {
     bool dynamic = false;              ///< hint: moves often
     bool hidden = false;               ///< kept in the list, acts on nothing
     std::string group{};
+    std::optional<Outline> outline{};
     friend bool operator==(const Edit&, const Edit&) = default;
 };
 

@@ -41,6 +41,7 @@ struct Camera {
     float bloom_size = 0.1f;     ///< Pyramid: the widest glow, as a share of the picture's height, (0, 1]
     float bloom_threshold = 1;   ///< Gaussian: exposed luminance above which light glows, >= 0
     BloomKind bloom_kind = BloomKind::Pyramid;
+    friend bool operator==(const Camera&, const Camera&) = default;
 };
 
 /// One light. Illuminance in lux, intensity in candela; colour scales both.
@@ -56,12 +57,14 @@ struct Light {
     float range = 0;                       ///< Point, Spot: where the light has faded to 0; 0 is no limit
     float radius = 0;                      ///< Point, Spot: metres, for soft shadows; 0 is a hard shadow
     float inner_deg = 15, outer_deg = 25;  ///< Spot: half angles of full and of no light
+    friend bool operator==(const Light&, const Light&) = default;
 };
 
 struct Environment {
     vec3 color{0.5f, 0.6f, 0.8f};  ///< radiance of a constant sky; not used where there is an image
     float intensity = 1;           ///< multiplies it
     std::string file{};  ///< equirectangular OpenEXR image, its middle towards -Z; relative to the scene's file
+    friend bool operator==(const Environment&, const Environment&) = default;
 };
 
 enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };

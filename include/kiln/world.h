@@ -26,6 +26,7 @@ struct FieldSettings {
     int levels = 1;
     std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %
     bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16
+    friend bool operator==(const FieldSettings&, const FieldSettings&) = default;
 };
 
 /// What a frame of a world of several levels may bake; what does not fit is shown coarser until a later frame.
@@ -41,6 +42,70 @@ struct ImportSettings {
     int resolution = 128;  ///< cells along the longest side, [8, 512]
 };
 
+class World;
+
+/// A step of a world's history: one change, or a group of them. Steps are numbered from 1; 0 is the beginning.
+struct HistoryStep {
+    uint32_t number = 0;
+    uint32_t parent = 0;  ///< the step it was made after; steps with one parent are branches
+    std::string title;    ///< the group's; else what its change was, "add lump"
+    uint32_t changes = 0;
+    bool done = false;  ///< it is in the world now
+};
+
+/// A world's changes, to be taken back and made again. Each costs what the change cost. All changes count: edits, materials, objects, and
+/// what was assigned to the world's public members, which becomes a step when the next change is made or record() is called.
+/// A handle: cheap, good while the world stands where it is. The owner's thread.
+class History {
+public:
+    /// The step after whose changes the world is now.
+    uint32_t now() const;
+    std::vector<HistoryStep> steps() const;
+    /// Takes the last step back; false when there is none. Undoing and changing something else keeps both branches.
+    Result<bool> undo();
+    /// Makes the step that was undone last again; false when there is none.
+    Result<bool> redo();
+    /// To the state after any step, also of another branch; 0: the beginning.
+    Result<void> go_to(uint32_t step);
+
+    /// Changes up to end_group() are one step (a brush stroke, a drag). Groups may be nested: the outermost counts.
+    void begin_group(std::string title);
+    Result<void> end_group();
+    /// Takes back what was changed since the outermost begin_group(), and forgets it.
+    Result<void> cancel_group();
+    /// Makes a step of what was assigned to the world's public members.
+    Result<void> record();
+    /// Forgets all steps; the world stays as it is.
+    Result<void> forget();
+
+private:
+    friend class World;
+    explicit History(World& world) : world_(world) {}
+    World& world_;
+};
+
+/// What became of the journal beside a scene.
+struct JournalReport {
+    std::string file;
+    uint64_t commands = 0;       ///< that were applied to what the scene file holds
+    uint64_t dropped_bytes = 0;  ///< behind the last good command
+    std::string reason;          ///< why they were
+    std::string kept_in;         ///< the file they were put into; empty when the scene was only read
+    bool foreign = false;        ///< it belongs to another scene, or to another version of this one
+    /// One line for people; empty when there is nothing to tell.
+    std::string sentence() const;
+};
+
+/// A command of a `--edits` file: JSON lines {"time": seconds, "command": {"add": EDIT}}, likewise change, remove, reorder and the
+/// scene's other sections (docs/scene-format.md).
+struct TimedCommand {
+    double time = 0;  ///< seconds
+    std::string file, text;
+    uint32_t line = 1;
+};
+/// The commands by ascending time, those of one time in the file's order. Errors read "FILE:LINE:COLUMN: what; what would be right".
+Result<std::vector<TimedCommand>> read_timed_commands(const std::string& path);
+
 class World {
 public:
     World();
@@ -48,25 +113,44 @@ public:
     World& operator=(World&&) noexcept;
     ~World();
 
-    /// A scene file, or the name of a bundled scene. Errors read "FILE:LINE:COLUMN: path.to.key: what; what would be right".
-    static Result<World> load(const std::string& path_or_name);
+    /// A scene file with the commands of the journal beside it, or the name of a bundled scene. Errors read
+    /// "FILE:LINE:COLUMN: path.to.key: what; what would be right".
+    /// `workers`: threads that read the journal, 0 for every core.
+    static Result<World> load(const std::string& path_or_name, int workers = 0);
     static Result<World> parse(std::string_view json, const std::string& file_name);
+    /// A scene file for editing: from now on every change is in the journal beside it (FILE.journal) before the call that made it
+    /// returns. It survives the end of the process at once, a power cut after a tenth of a second; save() brings it into the scene
+    /// file. Fails while another program edits the scene. A change that the disk has no room for is refused and the world left as it was.
+    static Result<World> open(const std::string& path, int workers = 0);
     /// A world of one mesh edit that reads `model` (.glb .gltf .obj .off .ply .stl), with a camera that sees all of it. `scene` is where
     /// it will be saved: the edit names the model relative to that. Errors read "MODEL: what; what would be right".
     static Result<World> import(const std::string& model, const std::string& scene,
                                 const ImportSettings& settings = {});
-    /// Writes the whole scene; the old file stays until the new one is complete.
+    /// Writes the whole scene; the old file stays until the new one is complete. Where the world was opened from there, its journal
+    /// begins anew.
     Result<void> save(const std::string& path) const;
+    /// What has been changed is on the disk when this returns (a power cut, too). Nothing to do for worlds without a journal.
+    Result<void> flush() const;
+    /// Of the journal that load() or open() found; nothing when there was none.
+    std::optional<JournalReport> journal_report() const;
     std::string to_json() const;
 
+    /// Adds a material, or changes the one of this name; nothing where it cannot be had (no name, NaN, a full disk).
     MaterialId add_material(const std::string& name, const Material& material);
     Result<ObjectId> add_object(Object object);
     /// Appends an edit. Fails on NaN, sizes out of range, references to nothing.
     Result<EditId> add(Edit edit);
     Result<void> change(EditId id, Edit edit);
     Result<void> remove(EditId id);
+    /// Puts an edit before another; before none: appends it.
+    Result<EditId> insert(Edit edit, EditId before);
     /// Moves an edit to stand just before another; before none: to the end.
     Result<void> reorder(EditId id, EditId before);
+    /// A change as data, {"add": EDIT} and the like; `name` is what errors call the text.
+    Result<void> apply(const std::string& command, const std::string& name = "command");
+    Result<void> apply(const TimedCommand& command);
+    /// Changes from the first call on can be undone.
+    History history();
     const Edit* find(EditId id) const;  ///< null when stale; valid until the next change
     std::optional<EditId> find_edit(std::string_view name) const;
     std::vector<EditId> edits() const;  ///< in order
@@ -100,6 +184,8 @@ public:
 
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;
+    /// The history and the journal (`kiln inspect --history`).
+    std::string history_json() const;
     /// What was found in the model files that the edits read, one sentence each: "bunny.obj: closed manifold of 69666 triangles".
     std::vector<std::string> model_notes() const;
     /// Sections of the scene that this version reads and keeps but does not draw ("meshes", "fluids", …).
@@ -108,11 +194,19 @@ public:
     struct Impl;
 
 private:
+    friend class History;
+    friend struct SceneDifference compare_scenes(const World& a, const World& b);
     std::unique_ptr<Impl> impl_;
 };
 
 /// Names and one-line descriptions of the scenes that come with Kiln.
 std::vector<std::pair<std::string, std::string>> bundled_scenes();
+/// How two scenes differ, by the ids of their edits (`kiln diff`): JSON, or lines for people.
+struct SceneDifference {
+    bool equal = true;
+    std::string json, lines;
+};
+SceneDifference compare_scenes(const World& a, const World& b);
 /// JSON Schema (2020-12) of the scene format, made from the same tables as the reader.
 std::string scene_schema_json();
 /// The engine's version, "0.1.0".

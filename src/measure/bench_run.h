@@ -58,5 +58,6 @@ struct BenchFamily {
     void (*run)(BenchRun&);
 };
 BenchFamily field_family();
+BenchFamily journal_family();
 
 }  // namespace kiln::measure

@@ -73,8 +73,8 @@ constexpr KeyRow kMaterialRows[] = {
 };
 
 constexpr KeyRow kOutlineRows[] = {
-    numbers("color", 3, kKept, {1, 0.6f, 0}, "1", "[0, 1]", "linear Rec. 709"),
-    number("width_px", kKept, 3, "px", "(0, 64]", "width on the screen"),
+    numbers("color", 3, KILN_AT(Outline, color), {1, 0.6f, 0}, "1", "[0, 1]", "linear Rec. 709"),
+    number("width_px", KILN_AT(Outline, width_px), 3, "px", "(0, 64]", "width on the screen"),
 };
 
 #define KILN_NODE_ROWS                                                                                      \

@@ -102,6 +102,8 @@ void JsonDocument::add_text(std::string_view value, std::string_view key) {
 
 void JsonDocument::add_bool(bool value, std::string_view key) { append(value ? JsonType::True : JsonType::False, key); }
 
+void JsonDocument::add_null(std::string_view key) { append(JsonType::Null, key); }
+
 void JsonDocument::add_copy(const JsonDocument& from, JsonIndex i, std::string_view key) {
     const JsonIndex base = JsonIndex(nodes_.size());
     for (JsonIndex j = i; j < from.next(i); ++j) {
@@ -156,6 +158,24 @@ std::string JsonDocument::source(JsonIndex i) const {
     std::string out;
     print_scalar(i, out);
     if (out.size() > 60) out = out.substr(0, 56) + "...\"";
+    return out;
+}
+
+std::string JsonDocument::line() const {
+    std::string out;
+    std::vector<JsonIndex> open;
+    const auto close = [&](JsonIndex before) {
+        for (; !open.empty() && next(open.back()) == before; open.pop_back())
+            out += type(open.back()) == JsonType::Object ? '}' : ']';
+    };
+    for (JsonIndex i = 0; i < nodes_.size(); ++i) {
+        close(i);
+        if (!open.empty() && first(open.back()) != i) out += ',';
+        if (!open.empty() && type(open.back()) == JsonType::Object) out += json_quoted(key(i)) + ":";
+        print_scalar(i, out);
+        if (type(i) >= JsonType::Array && first(i) != next(i)) open.push_back(i);
+    }
+    close(JsonIndex(nodes_.size()));
     return out;
 }
 

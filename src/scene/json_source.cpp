@@ -75,9 +75,10 @@ void append_utf8(std::string& out, uint32_t code) {
 /// One pass over the text. Containers that are open are kept in `open_`.
 class JsonParser {
 public:
-    JsonParser(std::string text, std::string name) {
+    JsonParser(std::string text, std::string name, uint32_t first_line) {
         doc_.text_ = std::move(text);
         doc_.name_ = std::move(name);
+        doc_.first_line_ = first_line;
     }
 
     Result<JsonDocument> run() {
@@ -375,8 +376,17 @@ private:
     std::optional<Error> error_;
 };
 
-Result<JsonDocument> JsonDocument::parse(std::string text, std::string name) {
-    return JsonParser(std::move(text), std::move(name)).run();
+Result<JsonDocument> JsonDocument::parse(std::string text, std::string name, uint32_t first_line) {
+    return JsonParser(std::move(text), std::move(name), first_line).run();
+}
+
+bool is_utf8(std::string_view text) {
+    for (size_t at = 0; at < text.size();) {
+        const size_t n = utf8_length(text, at);
+        if (n == 0) return false;
+        at += n;
+    }
+    return true;
 }
 
 float JsonDocument::number_as_float(JsonIndex i) const {
@@ -415,7 +425,7 @@ std::optional<JsonIndex> JsonDocument::find(JsonIndex object, std::string_view w
 }
 
 TextPlace JsonDocument::place_at(uint32_t offset) const {
-    TextPlace place;
+    TextPlace place{first_line_, 1};
     for (uint32_t i = text_.compare(0, 3, "\xEF\xBB\xBF") == 0 ? 3 : 0; i < offset && i < text_.size(); ++i) {
         if (text_[i] == '\n') {
             ++place.line;

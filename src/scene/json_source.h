@@ -30,7 +30,8 @@ struct TextPlace {
 class JsonDocument {
 public:
     /// Errors read "NAME:LINE:COLUMN: what is wrong; what would be right" (kind Input).
-    static Result<JsonDocument> parse(std::string text, std::string name);
+    /// `first_line`: where the text begins in its file.
+    static Result<JsonDocument> parse(std::string text, std::string name, uint32_t first_line = 1);
 
     JsonDocument() = default;
     JsonDocument(JsonDocument&&) = default;
@@ -70,11 +71,14 @@ public:
     void add_float(float value, std::string_view key = {});
     void add_text(std::string_view value, std::string_view key = {});
     void add_bool(bool value, std::string_view key = {});
+    void add_null(std::string_view key = {});
     /// A value of another document with all inside it.
     void add_copy(const JsonDocument& from, JsonIndex i, std::string_view key = {});
 
     /// The document as text: values that fit in 120 columns on one line, two spaces a level, shortest numbers, a final newline.
     std::string print() const;
+    /// The same on one line, as short as it goes, without an end.
+    std::string line() const;
 
 private:
     friend class JsonParser;
@@ -100,10 +104,13 @@ private:
     void print_scalar(JsonIndex i, std::string& out) const;
 
     std::string name_, text_, made_;
+    uint32_t first_line_ = 1;
     std::vector<Value> nodes_;
     std::vector<JsonIndex> open_;  // while building
 };
 
+/// Whether a document may hold it.
+bool is_utf8(std::string_view text);
 /// `text` as a JSON string with its quotes.
 std::string json_quoted(std::string_view text);
 /// Shortest digits that read back as the same float, also where JSON has no word for the value ("nan", "inf").

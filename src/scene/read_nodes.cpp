@@ -42,14 +42,6 @@ const sdf::FieldRow* find_field(const sdf::KindRow& row, std::string_view key) {
 
 }  // namespace
 
-bool NodeReader::materials_by_name(std::optional<JsonIndex> section) {
-    if (!section) return true;
-    uint32_t n = 0;
-    for (JsonIndex c = in_.doc.first(*section); c < in_.doc.next(*section); c = in_.doc.next(c))
-        materials_.emplace(in_.doc.key(c), n++);
-    return true;
-}
-
 bool NodeReader::unknown_node_key(JsonIndex member, const Table& table, const Node& node) {
     std::vector<std::string_view> known;
     if (node.kind == Node::Kind::Shape) {
@@ -80,6 +72,8 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     const auto kind = sdf::shape_kind(word);
     if (!kind) return in_.unknown_name(name, "shape", names_of(sdf::shape_rows()));
     out.kind = Node::Kind::Shape;
+    out.object = {};
+    out.shape = {};
     out.shape.kind = *kind;
     const sdf::KindRow& row = sdf::shape_rows()[*kind];
     set_defaults(row, out.shape.params);
@@ -129,7 +123,7 @@ bool NodeReader::domain(JsonIndex at, std::vector<Warp>& out) {
     return true;
 }
 
-bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
+bool NodeReader::node(JsonIndex at, Node& out, Edit* edit, bool partly) {
     const JsonDocument& doc = in_.doc;
     if (!doc.is(at, JsonType::Object))
         return in_.wrong_type(at, "an object such as {\"shape\": \"sphere\", \"radius\": 0.5}");
@@ -142,7 +136,7 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         return in_.fail_at_key(*object_at, "a shape and an object in one place; keep one of them");
     if (children_at && (shape_at || object_at))
         return in_.fail_at_key(*children_at, "children beside a shape or object; keep one of them");
-    if (!shape_at && !object_at && !children_at)
+    if (!shape_at && !object_at && !children_at && !partly)
         return in_.fail(at, edit ? "neither a shape nor an object; add for example \"shape\": \"sphere\""
                                  : "neither a shape, an object nor children; add for example \"shape\": \"sphere\"");
     if (shape_at && !shape(at, *shape_at, out)) return false;
@@ -151,6 +145,7 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         const auto found = objects_.find(doc.text(*object_at));
         if (found == objects_.end()) return in_.unknown_name(*object_at, "object", names_of(objects_));
         out.kind = Node::Kind::Object;
+        out.shape = {};
         out.object = {found->second, 0};
     }
     if (children_at) {
@@ -191,7 +186,7 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
             return in_.fail_at_key(m, "stands on the node with \"children\", not on a leaf; move it there");
         bool ok = true;
         if (row->type == KeyType::Node) {
-            if (key == "domain") ok = domain(m, out.domain);
+            if (key == "domain") out.domain.clear(), ok = domain(m, out.domain);
         } else if (key == "position") {
             ok = in_.numbers(m, row->numbers, &out.transform.position.x);
         } else if (key == "rotation") {
@@ -224,6 +219,8 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
             ok = in_.boolean(m, &edit->hidden);
         } else if (edit && key == "group") {
             ok = in_.text(m, "tower", &edit->group);
+        } else if (edit && key == "outline") {
+            ok = in_.table(m, kOutlineTable, &edit->outline.emplace().color.x);
         } else {
             ok = in_.value(m, *row, nullptr);
         }
@@ -233,6 +230,8 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit) {
         return in_.fail(at, "paint without a material; add \"material\"");
     return true;
 }
+
+bool NodeReader::edit(JsonIndex at, Edit& out, bool partly) { return node(at, out.node, &out, partly); }
 
 bool NodeReader::object_tree(JsonIndex at, Object& out, std::vector<JsonIndex>& places) {
     out.nodes.resize(1);
@@ -254,34 +253,32 @@ bool NodeReader::object_tree(JsonIndex at, Object& out, std::vector<JsonIndex>& 
     return true;
 }
 
-bool NodeReader::objects(JsonIndex section) {
+bool NodeReader::objects(JsonIndex section, SceneData& scene) {
     const JsonDocument& doc = in_.doc;
-    for (JsonIndex c = doc.first(section); c < doc.next(section); c = doc.next(c)) {
-        objects_.emplace(doc.key(c), uint32_t(scene_.objects.size()));
-        scene_.objects.push_back({std::string(doc.key(c)), {}});
-    }
-    scene_.object_places.resize(scene_.objects.size());
+    for (JsonIndex c = doc.first(section); c < doc.next(section); c = doc.next(c))
+        scene.objects.push_back({std::string(doc.key(c)), {}});
+    scene.object_places.resize(scene.objects.size());
     size_t n = 0;
     for (JsonIndex c = doc.first(section); c < doc.next(section); c = doc.next(c), ++n)
-        if (!object_tree(c, scene_.objects[n], scene_.object_places[n])) return false;
-    return no_cycles(section);
+        if (!object_tree(c, scene.objects[n], scene.object_places[n])) return false;
+    return no_cycles(scene);
 }
 
 // Depth-first over references with a stack of its own.
-bool NodeReader::no_cycles(JsonIndex) {
+bool NodeReader::no_cycles(const SceneData& scene) {
     enum Mark : uint8_t { Unseen, Open, Done };
     struct Visit {
         uint32_t object, node;
     };
-    std::vector<Mark> marks(scene_.objects.size(), Unseen);
+    std::vector<Mark> marks(scene.objects.size(), Unseen);
     std::vector<Visit> stack;
-    for (uint32_t root = 0; root < scene_.objects.size(); ++root) {
+    for (uint32_t root = 0; root < scene.objects.size(); ++root) {
         if (marks[root] != Unseen) continue;
         marks[root] = Open;
         stack.push_back({root, 0});
         while (!stack.empty()) {
             Visit& top = stack.back();
-            const Object& object = scene_.objects[top.object];
+            const Object& object = scene.objects[top.object];
             if (top.node == object.nodes.size()) {
                 marks[top.object] = Done;
                 stack.pop_back();
@@ -291,7 +288,7 @@ bool NodeReader::no_cycles(JsonIndex) {
             if (object.nodes[n].kind != Node::Kind::Object) continue;
             const uint32_t next = object.nodes[n].object.index;
             if (marks[next] == Open) {
-                const JsonIndex place = *in_.doc.find(scene_.object_places[top.object][n], "object");
+                const JsonIndex place = *in_.doc.find(scene.object_places[top.object][n], "object");
                 std::string path;
                 bool inside = false;
                 int shown = 0;
@@ -299,9 +296,9 @@ bool NodeReader::no_cycles(JsonIndex) {
                     inside = inside || v.object == next;
                     if (!inside) continue;
                     if (shown == 8) path += "... -> ";
-                    if (shown++ < 8) path += scene_.objects[v.object].name + " -> ";
+                    if (shown++ < 8) path += scene.objects[v.object].name + " -> ";
                 }
-                path += scene_.objects[next].name;
+                path += scene.objects[next].name;
                 return in_.fail(place,
                                 formatted("the object contains itself: {}; take one of these references out", path));
             }
@@ -314,29 +311,29 @@ bool NodeReader::no_cycles(JsonIndex) {
     return true;
 }
 
-bool NodeReader::edits(JsonIndex section) {
+bool NodeReader::edits(JsonIndex section, SceneData& scene) {
     const JsonDocument& doc = in_.doc;
     std::unordered_map<std::string, uint32_t> ids;
     const uint32_t count = doc.count(section);
-    scene_.edits.reserve(count);
-    scene_.edit_places.reserve(count);
+    scene.edits.reserve(count);
+    scene.edit_places.reserve(count);
     ids.reserve(count);
     for (JsonIndex c = doc.first(section); c < doc.next(section); c = doc.next(c)) {
-        Edit& edit = scene_.edits.emplace_back();
-        scene_.edit_places.push_back(c);
+        Edit& edit = scene.edits.emplace_back();
+        scene.edit_places.push_back(c);
         if (!node(c, edit.node, &edit)) return false;
         if (edit.name.empty()) continue;
-        if (const auto [old, fresh] = ids.emplace(edit.name, uint32_t(scene_.edits.size() - 1)); !fresh)
+        if (const auto [old, fresh] = ids.emplace(edit.name, uint32_t(scene.edits.size() - 1)); !fresh)
             return in_.fail(*doc.find(c, "id"),
                             formatted("edits[{}] has this id too; ids are unique, choose another", old->second));
     }
     // Ids for those without: "sphere-7" for the seventh edit.
-    for (size_t i = 0; i < scene_.edits.size(); ++i) {
-        Edit& edit = scene_.edits[i];
+    for (size_t i = 0; i < scene.edits.size(); ++i) {
+        Edit& edit = scene.edits[i];
         if (!edit.name.empty()) continue;
         const Node& n = edit.node;
         const std::string base(n.kind == Node::Kind::Shape ? sdf::shape_rows()[n.shape.kind].name
-                                                           : scene_.objects[n.object.index].name);
+                                                           : scene.objects[n.object.index].name);
         edit.name = formatted("{}-{}", base, i + 1);
         for (int k = 2; !ids.emplace(edit.name, uint32_t(i)).second; ++k)
             edit.name = formatted("{}-{}-{}", base, i + 1, k);

@@ -6,30 +6,32 @@
 #include "scene/scene_file.h"
 
 #include <string_view>
-#include <unordered_map>
 
 namespace kiln::scene {
 
 class NodeReader {
 public:
-    /// `scene` has its materials already; objects and edits are added to it.
-    NodeReader(ValueReader& values, SceneData& scene) : in_(values), scene_(scene) {}
+    /// What edits and trees may refer to.
+    NodeReader(ValueReader& values, const NameNumbers& materials, const NameNumbers& objects)
+        : in_(values), materials_(materials), objects_(objects) {}
 
-    bool materials_by_name(std::optional<JsonIndex> section);
-    bool objects(JsonIndex section);
-    bool edits(JsonIndex section);
+    /// All objects of a scene; their names are known already.
+    bool objects(JsonIndex section, SceneData& scene);
+    bool edits(JsonIndex section, SceneData& scene);
+    /// One edit, or some keys of one onto what `out` holds (`partly`).
+    bool edit(JsonIndex at, Edit& out, bool partly = false);
+    bool object_tree(JsonIndex at, Object& out, std::vector<JsonIndex>& places);
 
 private:
-    bool object_tree(JsonIndex at, Object& out, std::vector<JsonIndex>& places);
-    bool node(JsonIndex at, Node& out, Edit* edit);
+    bool node(JsonIndex at, Node& out, Edit* edit, bool partly = false);
     bool shape(JsonIndex at, JsonIndex name, Node& out);
     bool domain(JsonIndex at, std::vector<Warp>& out);
-    bool no_cycles(JsonIndex section);
+    bool no_cycles(const SceneData& scene);
     bool unknown_node_key(JsonIndex member, const Table& table, const Node& node);
 
     ValueReader& in_;
-    SceneData& scene_;
-    std::unordered_map<std::string_view, uint32_t> materials_, objects_;
+    const NameNumbers& materials_;
+    const NameNumbers& objects_;
 };
 
 }  // namespace kiln::scene

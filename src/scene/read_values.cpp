@@ -112,11 +112,18 @@ bool ValueReader::rotation(JsonIndex i, quat* out) {
     if (!(std::abs(length - 1) <= 1e-3))
         return fail(i, formatted("a quaternion of length {}; its length must be 1, such as [0, 0, 0, 1]",
                                  shortest(float(length))));
+    quat unit{q[0], q[1], q[2], q[3]};
+    make_unit(unit);
+    if (out) *out = unit;
+    return true;
+}
+
+void make_unit(quat& q) {
+    const double length = std::sqrt(double(q.x) * double(q.x) + double(q.y) * double(q.y) + double(q.z) * double(q.z) +
+                                    double(q.w) * double(q.w));
     // Already a unit quaternion in floats: left as it is, so that what was saved reads back as the same bits.
     if (std::abs(length - 1) > 2e-7)
-        for (float& v : q) v = float(double(v) / length);
-    if (out) *out = {q[0], q[1], q[2], q[3]};
-    return true;
+        for (float* v : {&q.x, &q.y, &q.z, &q.w}) *v = float(double(*v) / length);
 }
 
 bool ValueReader::boolean(JsonIndex i, bool* out) {

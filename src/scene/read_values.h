@@ -13,6 +13,9 @@
 
 namespace kiln::scene {
 
+/// Brings a quaternion near unit length to it; one that is as near as floats come keeps its bits.
+void make_unit(quat& q);
+
 class ValueReader {
 public:
     explicit ValueReader(const JsonDocument& document) : doc(document) {}

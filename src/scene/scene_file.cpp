@@ -21,15 +21,34 @@ namespace {
 
 class SceneReader {
 public:
-    explicit SceneReader(SceneData& scene) : scene_(scene), doc_(scene.source), in_(scene.source), nodes_(in_, scene) {}
+    SceneReader(SceneData& scene, const JsonDocument& doc, JsonIndex root)
+        : scene_(scene), doc_(doc), root_(root), in_(doc), nodes_(in_, scene.material_numbers, scene.object_numbers) {}
 
     std::optional<Error> run() {
         if (!sections()) return std::move(in_.error);
         return std::nullopt;
     }
 
+    std::optional<Error> run_section(JsonIndex at) {
+        const std::string_view key = doc_.key(at);
+        const KeyRow* const row = find_row(kSceneTable, key);
+        const bool good = row != nullptr && in_.value(at, *row, nullptr) &&
+                          (key == "field"         ? field()
+                           : key == "lights"      ? lights()
+                           : key == "environment" ? environment()
+                                                  : cameras());
+        if (!good) return std::move(in_.error);
+        return std::nullopt;
+    }
+
 private:
-    std::optional<JsonIndex> section(std::string_view key) const { return doc_.find(0, key); }
+    std::optional<JsonIndex> section(std::string_view key) const { return doc_.find(root_, key); }
+
+    void number(JsonIndex section, NameNumbers& names) const {
+        uint32_t n = 0;
+        for (JsonIndex c = doc_.first(section); c < doc_.next(section); c = doc_.next(c))
+            names.emplace(doc_.key(c), n++);
+    }
 
     bool sections() {
         if (!doc_.is(0, JsonType::Object)) return in_.wrong_type(0, "an object, at least {\"format\": 1}");
@@ -79,12 +98,16 @@ private:
         }
         if (scene_.materials.size() > 60000)
             return in_.fail(*at, formatted("{} materials; at most 60000", scene_.materials.size()));
-        return nodes_.materials_by_name(at);
+        number(*at, scene_.material_numbers);
+        return true;
     }
 
     bool objects_and_edits() {
-        if (const auto at = section("objects"); at && !nodes_.objects(*at)) return false;
-        if (const auto at = section("edits"); at && !nodes_.edits(*at)) return false;
+        if (const auto at = section("objects")) {
+            number(*at, scene_.object_numbers);
+            if (!nodes_.objects(*at, scene_)) return false;
+        }
+        if (const auto at = section("edits"); at && !nodes_.edits(*at, scene_)) return false;
         return true;
     }
 
@@ -202,6 +225,7 @@ private:
 
     SceneData& scene_;
     const JsonDocument& doc_;
+    JsonIndex root_;
     ValueReader in_;
     NodeReader nodes_;
 };
@@ -215,8 +239,12 @@ Result<SceneData> read_scene(std::string text, const std::string& name) {
     scene.source = std::move(*document);
     if (const size_t slash = name.find_last_of('/'); slash != std::string::npos)
         scene.folder = name.substr(0, slash + 1);
-    if (auto error = SceneReader(scene).run()) return std::move(*error);
+    if (auto error = SceneReader(scene, scene.source, 0).run()) return std::move(*error);
     return scene;
+}
+
+std::optional<Error> read_section(SceneData& scene, const JsonDocument& doc, JsonIndex object, JsonIndex section) {
+    return SceneReader(scene, doc, object).run_section(section);
 }
 
 }  // namespace kiln::scene

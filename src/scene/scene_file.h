@@ -7,11 +7,21 @@
 
 #include <kiln/world.h>
 
+#include <memory>
+#include <span>
 #include <string>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
 namespace kiln::scene {
+
+/// From names to numbers; asked with string views.
+struct TextHash {
+    using is_transparent = void;
+    size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
+};
+using NameNumbers = std::unordered_map<std::string, uint32_t, TextHash, std::equal_to<>>;
 
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
 /// sections that the engine does not act on yet, and how it wrote what has two forms.
@@ -31,6 +41,7 @@ struct SceneData {
     std::vector<std::pair<std::string, Material>> materials;  ///< MaterialId::index refers here
     std::vector<Object> objects;                              ///< ObjectId::index refers here
     std::vector<Edit> edits;
+    NameNumbers material_numbers, object_numbers;
 
     // Where things stand in `source`; kNowhere for what was added later.
     static constexpr JsonIndex kNowhere = UINT32_MAX;
@@ -43,11 +54,30 @@ struct SceneData {
 
 /// Errors read "NAME:LINE:COLUMN: path.to.key: what is wrong; what would be right".
 Result<SceneData> read_scene(std::string text, const std::string& name);
-/// The scene as it is saved. Canonical: reading it and writing it again gives the same bytes.
+/// Reads one member of an object that is no whole scene into `scene.stage`: field, lights, environment or cameras.
+std::optional<Error> read_section(SceneData& scene, const JsonDocument& doc, JsonIndex object, JsonIndex section);
+
+/// An edit, and where it stands in the scene's source.
+struct PlacedEdit {
+    const Edit* edit;
+    JsonIndex place;
+};
+/// The scene as it is saved, its edits given apart. Canonical: reading it and writing it again gives the same bytes.
+std::string write_scene(const SceneData& scene, const SceneData::Stage& stage, std::span<const PlacedEdit> edits);
 std::string write_scene(const SceneData& scene, const SceneData::Stage& stage);
+/// The same as if it had been made by code: no default is spelled out, keys stand in the order of the tables. Sections that are only kept
+/// are as they were.
+JsonDocument plain_document(const SceneData& scene, const SceneData::Stage& stage, std::span<const PlacedEdit> edits);
 
 /// A fault of one edit or object given by code; nothing when the reader would accept it.
 std::optional<Error> check_edit(const Edit& edit, size_t objects, size_t materials);
 std::optional<Error> check_object(const Object& object, size_t objects, size_t materials);
+std::optional<Error> check_material(const std::string& name, const Material& material);
+
+/// The edit as it reads back from a file: unit rotation, no -0, nothing in what no key holds. Worlds hold such edits only, so that one
+/// read from a file or a journal has the same bits as the one that was written.
+void make_canonical(Edit& edit);
+void make_canonical(Object& object);
+void make_canonical(Material& material);
 
 }  // namespace kiln::scene

@@ -2,9 +2,9 @@
 // Writes a scene: keys in the order of the file it came from, new keys in the order of the tables, shortest numbers.
 // A default is written only where the file had it.
 
-#include "scene/scene_file.h"
-
+#include "scene/command.h"
 #include "scene/format.h"
+#include "scene/scene_file.h"
 
 #include "sdf/expression_code.h"
 
@@ -20,16 +20,66 @@ using Members = std::vector<std::pair<std::string_view, JsonIndex>>;  // key, wh
 
 class SceneWriter {
 public:
-    SceneWriter(const SceneData& scene, const SceneData::Stage& stage)
-        : scene_(scene), stage_(stage), old_(scene.source) {}
+    SceneWriter(const SceneData& scene, const SceneData::Stage& stage, const JsonDocument& old,
+                std::span<const PlacedEdit> edits)
+        : scene_(scene), stage_(stage), old_(old), edits_(edits) {}
 
-    std::string run() {
+    JsonDocument run(bool plain = false) {
+        plain_ = plain;
         out_.open(JsonType::Object);
         std::vector<std::string_view> keys;
         for (const KeyRow& row : kSceneTable.rows) keys.push_back(row.name);
         for (const auto& [key, at] : members(old_.empty() ? kNowhere : 0, keys)) section(key, at);
         out_.close();
-        return out_.print();
+        return std::move(out_);
+    }
+
+    // Parts of a scene as they are written where there was none before.
+    std::string run(const CommandView& command) {
+        out_.open(JsonType::Object);
+        const std::string_view key = command_key(command.kind);
+        switch (command.kind) {
+        case CommandKind::Add:
+        case CommandKind::Change:
+            edit(key, *command.edit, kNowhere);
+            if (command.kind == CommandKind::Change && command.id != command.edit->name)
+                out_.add_text(command.id, "was");
+            break;
+        case CommandKind::Remove:
+        case CommandKind::Reorder:
+            out_.add_text(command.id, key);
+            break;
+        case CommandKind::Material:
+        case CommandKind::Object:
+            out_.open(JsonType::Object, key);
+            if (command.material != nullptr) {
+                out_.open(JsonType::Object, command.id);
+                material(*command.material, kNowhere);
+                out_.close();
+            } else if (command.object != nullptr) {
+                tree(*command.object, {});
+            } else {
+                out_.add_null(command.id);
+            }
+            out_.close();
+            break;
+        case CommandKind::Field:
+        case CommandKind::Lights:
+        case CommandKind::Cameras:
+            whole_ = true;
+            section(key, kNowhere);
+            break;
+        case CommandKind::Environment:
+            if (stage_.environment) {
+                section(key, kNowhere);
+            } else {
+                out_.add_null(key);
+            }
+            break;
+        }
+        if (!command.before.empty()) out_.add_text(command.before, "before");
+        out_.close();
+        return out_.line();
     }
 
 private:
@@ -78,17 +128,15 @@ private:
         if (at != kNowhere || value) out_.add_bool(value, key);
     }
 
-    void section(std::string_view key, JsonIndex at) {
+    void section(std::string_view key, JsonIndex stood) {
+        const JsonIndex at = plain_ ? kNowhere : stood;
         if (key == "format") return out_.add_number(1, key);
         if (key == "description") {
             if (!scene_.description.empty() || at != kNowhere) out_.add_text(scene_.description, key);
         } else if (key == "field") {
             field(at);
         } else if (key == "materials") {
-            named(key, at, scene_.materials, [&](const Material& m, JsonIndex was) {
-                for (const auto& [k, w] : members(was, kMaterialTable))
-                    number_row(*find_row(kMaterialTable, k), w, &m.base_color.x);
-            });
+            named(key, at, scene_.materials, [&](const Material& m, JsonIndex was) { material(m, was); });
         } else if (key == "objects") {
             objects(at);
         } else if (key == "edits") {
@@ -100,13 +148,19 @@ private:
         } else if (key == "cameras") {
             named(key, at, stage_.cameras, [&](const Camera& c, JsonIndex was) { camera(c, was); });
         } else {
-            keep(key, at);
+            keep(key, stood);
         }
+    }
+
+    void material(const Material& m, JsonIndex was) {
+        for (const auto& [k, w] : members(was, kMaterialTable))
+            number_row(*find_row(kMaterialTable, k), w, &m.base_color.x);
     }
 
     void field(JsonIndex at) {
         const FieldSettings& f = stage_.field;
-        if (at == kNowhere && f.voxel_size <= 0 && f.cells == 64 && f.levels == 1 && !f.bounds && !f.distance_8bit)
+        if (!whole_ && at == kNowhere && f.voxel_size <= 0 && f.cells == 64 && f.levels == 1 && !f.bounds &&
+            !f.distance_8bit)
             return;
         out_.open(JsonType::Object, "field");
         for (const auto& [key, was] : members(at, kFieldTable)) {
@@ -128,7 +182,7 @@ private:
     template <typename T, typename WriteOne>
     void named(std::string_view key, JsonIndex at, const std::vector<std::pair<std::string, T>>& items,
                WriteOne write) {
-        if (at == kNowhere && items.empty()) return;
+        if (!whole_ && at == kNowhere && items.empty()) return;
         out_.open(JsonType::Object, key);
         std::unordered_map<std::string_view, const T*> by_name;
         std::vector<std::string_view> names;
@@ -163,7 +217,7 @@ private:
     }
 
     void lights(JsonIndex at) {
-        if (at == kNowhere && stage_.lights.empty()) return;
+        if (!whole_ && at == kNowhere && stage_.lights.empty()) return;
         out_.open(JsonType::Array, "lights");
         JsonIndex was = at == kNowhere ? kNowhere : old_.first(at);
         for (const Light& light : stage_.lights) {
@@ -294,7 +348,13 @@ private:
         if (edit && key == "dynamic") return flag(key, at, edit->dynamic);
         if (edit && key == "hidden") return flag(key, at, edit->hidden);
         if (edit && key == "group") return text(key, at, edit->group, "");
-        if (edit && key == "outline") return keep(key, at);
+        if (edit && key == "outline") {
+            if (!edit->outline) return;
+            out_.open(JsonType::Object, key);
+            for (const auto& [k, w] : members(at, kOutlineTable))
+                number_row(*find_row(kOutlineTable, k), w, &edit->outline->color.x);
+            return out_.close();
+        }
         if (node.kind == Node::Kind::Shape)
             parameter(key, at, sdf::shape_rows()[node.shape.kind], node.shape.params.data());
     }
@@ -343,33 +403,52 @@ private:
         static const std::vector<JsonIndex> kNone;
         out_.open(JsonType::Object, "objects");
         for (size_t i = 0; i < scene_.objects.size(); ++i)
-            tree(scene_.objects[i], i < scene_.object_places.size() ? scene_.object_places[i] : kNone);
+            tree(scene_.objects[i], !plain_ && i < scene_.object_places.size() ? scene_.object_places[i] : kNone);
         out_.close();
     }
 
     void edits(JsonIndex at) {
-        if (at == kNowhere && scene_.edits.empty()) return;
+        if (at == kNowhere && edits_.empty()) return;
         out_.open(JsonType::Array, "edits");
-        for (size_t i = 0; i < scene_.edits.size(); ++i) {
-            const Edit& edit = scene_.edits[i];
-            out_.open(JsonType::Object);
-            const JsonIndex was = i < scene_.edit_places.size() ? scene_.edit_places[i] : kNowhere;
-            for (const auto& [key, w] : node_members(edit.node, &edit, was)) node_key(key, w, edit.node, &edit);
-            out_.close();
-        }
+        for (const PlacedEdit& placed : edits_) edit({}, *placed.edit, placed.place);
+        out_.close();
+    }
+
+    void edit(std::string_view as, const Edit& edit, JsonIndex was) {
+        out_.open(JsonType::Object, as);
+        for (const auto& [key, w] : node_members(edit.node, &edit, was)) node_key(key, w, edit.node, &edit);
         out_.close();
     }
 
     const SceneData& scene_;
     const SceneData::Stage& stage_;
     const JsonDocument& old_;
+    std::span<const PlacedEdit> edits_;
+    bool whole_ = false;  // sections are written even where they say nothing
+    bool plain_ = false;  // as if there were no old one
     JsonDocument out_;
 };
 
 }  // namespace
 
+std::string write_scene(const SceneData& scene, const SceneData::Stage& stage, std::span<const PlacedEdit> edits) {
+    return SceneWriter(scene, stage, scene.source, edits).run().print();
+}
+
 std::string write_scene(const SceneData& scene, const SceneData::Stage& stage) {
-    return SceneWriter(scene, stage).run();
+    std::vector<PlacedEdit> edits;
+    for (size_t i = 0; i < scene.edits.size(); ++i)
+        edits.push_back({&scene.edits[i], i < scene.edit_places.size() ? scene.edit_places[i] : kNowhere});
+    return write_scene(scene, stage, edits);
+}
+
+JsonDocument plain_document(const SceneData& scene, const SceneData::Stage& stage, std::span<const PlacedEdit> edits) {
+    return SceneWriter(scene, stage, scene.source, edits).run(true);
+}
+
+std::string write_command(const SceneData& scene, const SceneData::Stage& stage, const CommandView& command) {
+    static const JsonDocument kNothing;
+    return SceneWriter(scene, stage, kNothing, {}).run(command);
 }
 
 }  // namespace kiln::scene

@@ -9,6 +9,7 @@
 #include "render/lib/pack.h"
 #include "sdf/tables.h"
 
+#include "base/assert.h"
 #include "base/format.h"
 
 #include <nlohmann/json.hpp>
@@ -27,11 +28,6 @@ constexpr int kMostDoublings = 24;
 /// More changes than this since the last field, and it is built anew.
 constexpr size_t kMostChanges = 256;
 
-bool same(const FieldSettings& a, const FieldSettings& b) {
-    return a.voxel_size == b.voxel_size && a.cells == b.cells && a.levels == b.levels && a.bounds == b.bounds &&
-           a.distance_8bit == b.distance_8bit;
-}
-
 float longest_side(const Box3& box) {
     const vec3 size = box.max - box.min;
     return std::max({size.x, size.y, size.z});
@@ -48,9 +44,34 @@ double cells_of(const Box3& box, float voxel) {
 void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     const std::lock_guard lock(mutex);
     program.reset();
-    changes.push_back({removed, inserted});
-    level_changes.push_back({removed, inserted});
+    if (levels) level_changes.push_back({removed, inserted});
+    if (level_changes.size() > kMostChanges) {
+        levels.reset();
+        level_changes.clear();
+    }
     asked.reset();
+    if (!built.field) return;
+    if (changes.size() > kMostChanges) {
+        built = {};
+        return forget_changes();
+    }
+    // A row that came since the field was made and goes again leaves no trace in it.
+    if (removed != field::kNoRow) {
+        if (const auto came = inserted_since.find(removed); came != inserted_since.end()) {
+            field::RowChange& change = changes[came->second];
+            change.inserted = inserted;
+            if (inserted != field::kNoRow) inserted_since.emplace(inserted, came->second);
+            inserted_since.erase(removed);
+            return;
+        }
+    }
+    if (inserted != field::kNoRow) inserted_since.emplace(inserted, uint32_t(changes.size()));
+    changes.push_back({removed, inserted});
+}
+
+void World::Impl::forget_changes() {
+    changes.clear();
+    inserted_since.clear();
 }
 
 std::shared_ptr<const sdf::Program> World::Impl::compiled() {
@@ -59,20 +80,27 @@ std::shared_ptr<const sdf::Program> World::Impl::compiled() {
     return program;
 }
 
+void World::Impl::let_old_rows_go() {
+    if (list.edits.size() == edits.size()) return;
+    const auto done = compile_all();
+    KILN_ASSERT(bool(done), "a world that was compiled compiles no more: {}", done ? "" : done.error().message);
+}
+
 Result<void> World::Impl::compile_all() {
     sdf::Fault fault;
+    std::vector<uint32_t> slots;
     const auto placed = [&](Error error) -> Error {
         // From the compiler's numbers back to the file.
         const scene::JsonDocument& doc = data.source;
         scene::JsonIndex at = scene::SceneData::kNowhere;
         if (fault.object < data.object_places.size() && fault.node < data.object_places[fault.object].size()) {
             at = data.object_places[fault.object][fault.node];
-        } else if (fault.object == UINT32_MAX && fault.edit < data.edit_places.size()) {
-            at = data.edit_places[fault.edit];
+        } else if (fault.object == UINT32_MAX && fault.edit < slots.size()) {
+            at = edits[slots[fault.edit]].place;
         }
         error.kind = ErrorKind::Input;
         if (at == scene::SceneData::kNowhere) {
-            if (fault.edit < data.edits.size()) error.message = data.edits[fault.edit].name + ": " + error.message;
+            if (fault.edit < slots.size()) error.message = edits[slots[fault.edit]].edit->name + ": " + error.message;
             return error;
         }
         if (fault.warp >= 0) {
@@ -87,16 +115,35 @@ Result<void> World::Impl::compile_all() {
         }
         return doc.error(at, error.message);
     };
-    auto source = scene::with_grids(data.edits, data.objects, data.folder, grids, &fault);
-    if (!source) return placed(source.error());
-    auto made = sdf::compile(source->source(), &fault);
+    // The compiler wants them side by side: their nodes are lent to it.
+    std::vector<Edit> flat;
+    flat.reserve(edits.size());
+    slots.reserve(edits.size());
+    edits.each([&](uint32_t slot) {
+        Edit& e = *edits[slot].edit;
+        Edit& lent = flat.emplace_back();
+        lent.node = std::move(e.node);
+        lent.op = e.op;
+        lent.blend_radius = e.blend_radius;
+        lent.material_blend_radius = e.material_blend_radius;
+        lent.hidden = e.hidden;
+        slots.push_back(slot);
+    });
+    auto source = scene::with_grids(flat, data.objects, data.folder, grids, &fault);
+    sdf::Source compiled_source;
+    if (source) {
+        compiled_source = source->source();
+        compiled_source.owners = slots;
+    }
+    auto made = source ? sdf::compile(compiled_source, &fault) : Result<sdf::Program>(source.error());
+    for (size_t i = 0; i < slots.size(); ++i) edits[slots[i]].edit->node = std::move(flat[i].node);
     if (!made) return placed(made.error());
     list = std::move(*made);
-    for (uint32_t i = 0; i < ids.size(); ++i) slots[ids[i].index].row = i;
+    for (uint32_t i = 0; i < slots.size(); ++i) edits.set_row(slots[i], i);
     const std::lock_guard lock(mutex);
     program.reset();
     built = {};
-    changes.clear();
+    forget_changes();
     levels.reset();
     level_changes.clear();
     return {};
@@ -123,7 +170,7 @@ World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const Fie
 Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     const std::shared_ptr<const sdf::Program> now = compiled();
     const std::lock_guard lock(mutex);
-    const bool comparable = built.field && same(settings, built_with);
+    const bool comparable = built.field && settings == built_with;
     if (comparable && changes.empty()) return built;
     if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
         return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
@@ -136,7 +183,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
         // Only what the changes reach is made again.
         if (auto updated = field::Field::update(*built.field, now, changes)) {
             built.field = std::move(*updated);
-            changes.clear();
+            forget_changes();
             return built;
         }
     }
@@ -155,7 +202,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     }
     built = next;
     built_with = settings;
-    changes.clear();
+    forget_changes();
     return next;
 }
 
@@ -272,15 +319,16 @@ std::string World::inspect_json() const {
     const scene::SceneData& data = impl_->data;
     Json out;
     out["description"] = data.description;
-    out["edits"] = data.edits.size();
+    out["edits"] = impl_->edits.size();
     size_t hidden = 0;
     std::map<std::string, int> shapes, ops;
     constexpr const char* kOps[] = {"union", "subtract", "intersect", "paint"};
-    for (const Edit& e : data.edits) {
+    impl_->edits.each([&](uint32_t slot) {
+        const Edit& e = *impl_->edits[slot].edit;
         hidden += e.hidden;
         ++shapes[e.node.kind == Node::Kind::Shape ? std::string(sdf::shape_rows()[e.node.shape.kind].name) : "object"];
         ++ops[kOps[size_t(e.op)]];
-    }
+    });
     out["hidden"] = hidden;
     out["shapes"] = shapes;
     out["ops"] = ops;
@@ -293,6 +341,10 @@ std::string World::inspect_json() const {
     out["cameras"] = camera_names;
     out["not_drawn_yet"] = data.undrawn;
     const std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    if (impl_->report) {
+        const JournalReport& r = *impl_->report;
+        out["journal"] = {{"file", r.file}, {"commands", r.commands}, {"dropped_bytes", r.dropped_bytes}};
+    }
     out["bounds"] = box_json(program->bounds);
     out["unbounded"] = program->unbounded;
     out["instructions"] = program->tape().size();

@@ -2,8 +2,12 @@
 // What a World holds: the scene's data, ids of edits, and what was compiled from them.
 #pragma once
 
+#include "scene/command.h"
+#include "scene/edit_list.h"
 #include "scene/exact.h"
 #include "scene/heights.h"
+#include "scene/history.h"
+#include "scene/journal.h"
 #include "scene/scene_file.h"
 #include "scene/sky_image.h"
 
@@ -17,6 +21,7 @@
 
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -40,31 +45,56 @@ struct WorldView::Impl {
 };
 
 struct World::Impl {
-    struct Slot {
-        uint32_t position = UINT32_MAX;  ///< in data.edits; UINT32_MAX when free
-        uint32_t generation = 0;
-        uint32_t row = field::kNoRow;  ///< in `list`
-    };
+    scene::SceneData data;  ///< but for its edits
+    scene::EditList edits;  ///< their rows are those of `list`
+    uint64_t names_given = 0;
 
-    scene::SceneData data;
-    std::vector<EditId> ids;  ///< by position
-    std::vector<Slot> slots;
-    std::vector<uint32_t> free_slots;
-    std::unordered_map<std::string, uint32_t> names;  ///< of edits, to positions
+    // Changes (world_changes.cpp). Each exchanges what the change holds with what the world has.
+    Result<void> exchange(World& world, scene::Change& change);
+    Result<void> exchange_edit(scene::Change& change);
+    Result<void> exchange_material(scene::Change& change);
+    Result<void> exchange_object(scene::Change& change);
+    /// As exchange(), of changes that were good a moment ago.
+    void take_back(World& world, scene::Change& change);
+    /// The command that leads from the state that the change holds to what the world has now.
+    std::string command_of(const World& world, const scene::Change& change) const;
+    /// Makes a change, in the journal and the history too.
+    Result<void> make(World& world, scene::Change change);
+    /// What was assigned to the world's public members becomes a step.
+    Result<void> record_stage(const World& world);
+    Result<void> journal_change(const World& world, const scene::Change& change, uint32_t& sequence);
+    Result<void> apply(World& world, scene::Command command);
+    Result<void> go_to(World& world, uint32_t step);
+    Result<void> end_group(World& world);
+    Result<void> cancel_group(World& world);
+    void keep_log(const World& world);
+    std::vector<HistoryStep> steps() const;
+    scene::CommandNames names() const;
 
-    void number_all();
-    EditId new_id(uint32_t position);
-    std::optional<uint32_t> position(EditId id) const;
-    std::optional<uint32_t> position_of(std::string_view name) const;
-    void rename(const std::string& old_name, const std::string& name, uint32_t position);
-    void erase(uint32_t position);
-    std::string free_name(const Edit& edit) const;
+    std::unique_ptr<scene::Log> log;
+    std::unique_ptr<scene::Journal> journal;
+    std::optional<JournalReport> report;
+    /// While a journal is read: nothing is compiled until all is there.
+    bool compile_later = false;
+    bool group_left_open = false;  ///< by the journal that was read
+
+    // Files (world_files.cpp).
+    Result<void> read(World& world, std::string text, const std::string& name);
+    Result<void> get_ready(World& world);
+    /// Applies the records from `first` on, all or up to the first that cannot be; answers how many were taken.
+    size_t replay(World& world, const Records& records, const scene::JournalStart& start, int workers);
+    Result<void> read_journaled(World& world, std::string text, const std::string& scene, std::string_view bytes,
+                                Records& records, int workers);
+    Result<void> compact(const World& world);
+
+    void adopt(std::vector<Edit> edits, const std::vector<scene::JsonIndex>& places);
+    std::string free_name(const Edit& edit);
+    std::string json(const World& world) const;
     /// Puts an edit given by code into the list, at the place `order`, or says why not.
     Result<uint32_t> compile_edit(const Edit& edit, uint64_t order, uint32_t owner);
     std::optional<Error> object_fault(const Edit& placed);
-    /// The place in the list between the edits at two positions; makes room where there is none.
-    uint64_t order_between(uint32_t before, uint32_t after);
-    void move_position(uint32_t from, uint32_t to);
+    /// The place in the list just before an edit; makes room where there is none.
+    uint64_t order_before(uint32_t slot, uint32_t moving = scene::EditList::kNone);
     void row_changed(uint32_t removed, uint32_t inserted);
 
     /// What the field is made with, after defaults.
@@ -87,7 +117,9 @@ struct World::Impl {
     PagedArray<uint32_t, 256> generations;         ///< of slots, shared with views
     Built built;
     FieldSettings built_with;
-    std::vector<field::RowChange> changes;            ///< since `built`
+    std::vector<field::RowChange> changes;                  ///< since `built`
+    std::unordered_map<uint32_t, uint32_t> inserted_since;  ///< rows that `changes` insert, to where
+    void forget_changes();
     std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
     std::optional<field::Clipmap> levels;             ///< of a world of several, where it was last looked at from
     FieldSettings levels_with;
@@ -105,6 +137,8 @@ struct World::Impl {
 
     /// Compiles the whole list.
     Result<void> compile_all();
+    /// Compiles it again where it keeps rows of edits that are no more.
+    void let_old_rows_go();
     std::shared_ptr<const sdf::Program> compiled();
     std::shared_ptr<const WorldView::Impl> view();
     Result<Built> field(const FieldSettings& settings);

@@ -94,7 +94,8 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
     const Box3 solid = program->bounds.inflated(reach);
     const bool within = !program->unbounded && bounds.contains(solid.min) && bounds.contains(solid.max);
     if (!within && !rows.empty()) {
-        std::vector<Edit> edits = impl_->data.edits;
+        std::vector<Edit> edits;
+        impl_->edits.each([&](uint32_t slot) { edits.push_back(*impl_->edits[slot].edit); });
         edits.push_back(cut_to(bounds));
         const std::lock_guard lock(impl_->mutex);
         const auto source = scene::with_grids(edits, impl_->data.objects, impl_->data.folder, impl_->grids);

@@ -592,7 +592,7 @@ Result<Program> compile(const Source& source, Fault* fault) {
     begin(out);
     Compiler compiler(*resolved, out);
     for (uint32_t e = 0; e < source.edits.size(); ++e) {
-        if (auto r = compiler.add(e, order_at(e), e); !r) return r.error();
+        if (auto r = compiler.add(e, order_at(e), source.owners.empty() ? e : source.owners[e]); !r) return r.error();
     }
     adopt_grids(out, *resolved);
     out.settle();

@@ -185,6 +185,7 @@ struct Source {
     uint32_t samples = 0;                       ///< how many numbers it holds
     std::span<const MeshGrid> meshes{};         ///< likewise for `mesh`
     std::span<const uint32_t> placed_meshes{};  ///< blocks of the first meshes
+    std::span<const uint32_t> owners{};         ///< EditSpan::owner by edit; none: the edits' own numbers
 };
 
 /// Where compile() found a fault.

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The command line from outside: exit codes, where things are said, and that nothing is left behind.
 
+#include <kiln/world.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -82,6 +84,8 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"rendr x -o a.png", "did you mean `kiln render`?"},
         {"frobnicate", "`kiln --help` lists them"},
         {"simulate x", "comes with a later version"},
+        {"diff potter", "required"},
+        {"new a.json", "ends in .kiln.json"},
         {"render", "required"},
         {"render potter", "--output"},
         {"render potter -o a.jpg", "end the name in .png or .exr"},
@@ -159,7 +163,7 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
     for (const char* verb : {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema",
-                             "doctor", "compare", "bench"}) {
+                             "doctor", "compare", "diff", "new", "bench"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;
         EXPECT_LT(o.out.find("Examples:"), o.out.find("Options:")) << o.out;
@@ -337,6 +341,70 @@ TEST_F(Cli, InterruptedIs130AndLeavesNothing) {
                                 "' render ball.kiln.json -o a.png --size 4096x4096 --reference 4096 >/dev/null 2>&1";
     EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 130);
     EXPECT_THAT(files(), testing::ElementsAre("ball.kiln.json"));
+}
+
+TEST_F(Cli, NewMakesASceneAndDiffTellsHowTwoDiffer) {
+    EXPECT_EQ(run("new a.kiln.json").code, 0);
+    EXPECT_EQ(run("validate a.kiln.json").code, 0);
+    const Outcome again = run("new a.kiln.json");
+    EXPECT_EQ(again.code, 1);
+    EXPECT_THAT(again.err, HasSubstr("--force"));
+    EXPECT_EQ(run("new b.kiln.json --from a.kiln.json").code, 0);
+    EXPECT_EQ(run("new none/b.kiln.json").code, 1);
+    EXPECT_EQ(run("new c.kiln.json --from none.kiln.json").code, 3);
+    const Outcome same = run("diff a.kiln.json b.kiln.json");
+    EXPECT_EQ(same.code, 0) << same.err;
+    EXPECT_EQ(same.out, "");
+    write("b.kiln.json", kBall);
+    const Outcome differ = run("diff a.kiln.json b.kiln.json");
+    EXPECT_EQ(differ.code, 1) << differ.err;
+    EXPECT_THAT(differ.out, HasSubstr("edits\n  - ground\n  ~ ball: "));
+    EXPECT_EQ(differ.err, "");
+    const Outcome json = run("diff a.kiln.json b.kiln.json --json");
+    EXPECT_EQ(json.code, 1);
+    EXPECT_THAT(json.out, HasSubstr("\"equal\": false"));
+    EXPECT_EQ(run("diff a.kiln.json none.kiln.json").code, 3);
+    EXPECT_THAT(files(), testing::ElementsAre("a.kiln.json", "b.kiln.json"));
+}
+
+TEST_F(Cli, ASceneIsSeenWithItsJournal) {
+    write("s.kiln.json", kBall);
+    const std::string scene = (folder_ / "s.kiln.json").string();
+    {
+        auto world = kiln::World::open(scene);
+        ASSERT_TRUE(world) << world.error().message;
+        ASSERT_TRUE(world->apply(
+            "{\"add\": {\"id\": \"top\", \"shape\": \"sphere\", \"radius\": 1, \"position\": [0, 5, 0]}}"));
+        world->history().begin_group("stroke");
+        ASSERT_TRUE(world->apply("{\"change\": {\"id\": \"top\", \"position\": [0, 6, 0]}}"));
+        ASSERT_TRUE(world->apply("{\"change\": {\"id\": \"ball\", \"radius\": 2}}"));
+        ASSERT_TRUE(world->history().end_group());
+        ASSERT_TRUE(world->history().undo());
+    }
+    const Outcome query = run("query s.kiln.json --points -", "echo 0,8,0 |");
+    EXPECT_EQ(query.code, 0);
+    EXPECT_THAT(query.out, HasSubstr("0,8,0,2,0,1,0,")) << "the ball that only the journal has";
+    EXPECT_EQ(query.err, "s.kiln.json.journal: 4 commands applied\n");
+    EXPECT_THAT(run("inspect s.kiln.json --json").out, HasSubstr("\"commands\": 4"));
+    EXPECT_THAT(run("validate s.kiln.json --json").out, HasSubstr("\"journal\": {\"file\": \"s.kiln.json.journal\""));
+    const Outcome history = run("inspect s.kiln.json --history");
+    EXPECT_EQ(history.out,
+              "journal s.kiln.json.journal: 4 commands applied\n> 1  add top\n  2  stroke (2 changes)  undone\n");
+    EXPECT_EQ(history.err, "");
+    EXPECT_THAT(run("inspect s.kiln.json --history --json").out,
+                HasSubstr("\"title\": \"stroke\",\n      \"done\": false"));
+    write("plain.kiln.json", kBall);
+    EXPECT_EQ(run("diff plain.kiln.json s.kiln.json").out, "edits\n  + top\n");
+    EXPECT_EQ(run("inspect plain.kiln.json --history").out, "no steps: the scene file holds all\n");
+    // Broken: what is good is used, the rest is told and left alone.
+    const std::string journal = read(folder_ / "s.kiln.json.journal");
+    write("s.kiln.json.journal", journal.substr(0, journal.size() - 3));
+    const Outcome broken = run("validate s.kiln.json");
+    EXPECT_EQ(broken.code, 0);
+    EXPECT_THAT(broken.err, HasSubstr("bytes of the journal left out: record 6 is cut short"));
+    expect_one_line(broken, "broken");
+    EXPECT_EQ(read(folder_ / "s.kiln.json.journal").size(), journal.size() - 3);
+    EXPECT_EQ(run("new s.kiln.json --force").code, 0);
 }
 
 // On a device (the CPU renderer of the gate).

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: MIT
+
+#include "cli/scene.h"
+
+#include "cli/talk.h"
+
+namespace kiln::cli {
+
+void tell_journal(const World& world) {
+    if (const auto report = world.journal_report()) say(report->sentence());
+}
+
+Result<World> load_scene(const std::string& path_or_name) {
+    auto world = World::load(path_or_name);
+    if (world) tell_journal(*world);
+    return world;
+}
+
+void add_journal(Json& json, const World& world) {
+    const auto report = world.journal_report();
+    if (!report) return;
+    Json one;
+    one.text("file", report->file).number("commands", double(report->commands));
+    one.number("dropped_bytes", double(report->dropped_bytes)).flag("foreign", report->foreign);
+    json.raw("journal", one.object());
+}
+
+}  // namespace kiln::cli
