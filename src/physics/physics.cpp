@@ -73,6 +73,8 @@ Box3 box_around(vec3 center, float radius) { return Box3{center, center}.inflate
 
 Result<BodyId> World::add(const BodySettings& settings) {
     if (auto fault = fault_of(settings)) return std::move(*fault);
+    if (count_ == kMostBodies)
+        return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
     uint32_t index = uint32_t(bodies_.size());
     if (free_.empty()) {
         bodies_.emplace_back();

@@ -70,10 +70,12 @@ struct WorldSettings {
 /// Same input, same bytes, for any number of threads within one engine.
 class World {
 public:
+    static constexpr uint32_t kMostBodies = 1u << 16;
+
     virtual ~World() = default;
     virtual std::string_view backend() const = 0;
 
-    /// Refused, with the reason: no volume, numbers that are not finite, a field without end that is to move.
+    /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move.
     Result<BodyId> add(const BodySettings& settings);
     void remove(BodyId id);
     bool contains(BodyId id) const { return find(id) != nullptr; }

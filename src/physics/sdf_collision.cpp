@@ -191,9 +191,10 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
                     if (slope2 > 1e-6f) local = local - n * (value / std::max(slope2, kLeastSlope));
                 }
                 const Probe there = probe(other.field(), other_from_shell * local, now.normal);
-                if (there.depth > now.depth) {
-                    now = there;
-                } else {
+                const float gain = there.depth - now.depth;
+                if (gain > 0) now = there;
+                if (std::abs(gain) < 1e-3f * shell.spacing()) break;
+                if (gain < 0) {
                     step *= 0.3f;
                 }
             }
