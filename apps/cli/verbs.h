@@ -22,5 +22,6 @@ void add_doctor(CLI::App& app, Run& run);
 void add_compare(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
+void add_simulate(CLI::App& app, Run& run);
 
 }  // namespace kiln::cli

@@ -24,7 +24,8 @@ std::string_view jolt_fault() {
 #endif
 #endif
     if (!JPH::VerifyJoltVersionID())
-        return "the library was built with other options than its headers were read with: build Jolt as Release or Distribution, with "
+        return "the library was built with other options than its headers were read with: build Jolt as Release or "
+               "Distribution, with "
                "DEBUG_RENDERER_IN_DEBUG_AND_RELEASE=OFF and PROFILER_IN_DEBUG_AND_RELEASE=OFF, and Kiln anew";
     return {};
 }

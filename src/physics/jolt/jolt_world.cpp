@@ -47,24 +47,34 @@ void set_up() {
 
 // Two layers, of what stands and what moves: what stands meets only what moves.
 constexpr ObjectLayer kStands = 0, kMoves = 1;
-class Layers final : public BroadPhaseLayerInterface, public ObjectVsBroadPhaseLayerFilter, public ObjectLayerPairFilter {
+class Layers final : public BroadPhaseLayerInterface,
+                     public ObjectVsBroadPhaseLayerFilter,
+                     public ObjectLayerPairFilter {
 public:
     uint GetNumBroadPhaseLayers() const override { return 2; }
-    BroadPhaseLayer GetBroadPhaseLayer(ObjectLayer layer) const override { return BroadPhaseLayer(BroadPhaseLayer::Type(layer)); }
+    BroadPhaseLayer GetBroadPhaseLayer(ObjectLayer layer) const override {
+        return BroadPhaseLayer(BroadPhaseLayer::Type(layer));
+    }
 #if defined(JPH_EXTERNAL_PROFILE) || defined(JPH_PROFILE_ENABLED)
     const char* GetBroadPhaseLayerName(BroadPhaseLayer) const override { return "layer"; }
 #endif
-    bool ShouldCollide(ObjectLayer a, BroadPhaseLayer b) const override { return a == kMoves || b == BroadPhaseLayer(kMoves); }
+    bool ShouldCollide(ObjectLayer a, BroadPhaseLayer b) const override {
+        return a == kMoves || b == BroadPhaseLayer(kMoves);
+    }
     bool ShouldCollide(ObjectLayer a, ObjectLayer b) const override { return a == kMoves || b == kMoves; }
 };
 
 Ref<JPH::Shape> make_shape(const Convex& c) {
     const float round = std::min(cDefaultConvexRadius, 0.1f * inner_radius(c));  // of edges
     switch (c.kind) {
-    case Convex::Kind::Sphere: return new SphereShape(c.size.x);
-    case Convex::Kind::Box: return new BoxShape(to_jolt(c.size), round);
-    case Convex::Kind::Capsule: return new CapsuleShape(c.size.y, c.size.x);
-    case Convex::Kind::Cylinder: return new CylinderShape(c.size.y, c.size.x, round);
+    case Convex::Kind::Sphere:
+        return new SphereShape(c.size.x);
+    case Convex::Kind::Box:
+        return new BoxShape(to_jolt(c.size), round);
+    case Convex::Kind::Capsule:
+        return new CapsuleShape(c.size.y, c.size.x);
+    case Convex::Kind::Cylinder:
+        return new CylinderShape(c.size.y, c.size.x, round);
     }
     return nullptr;
 }
@@ -123,7 +133,8 @@ protected:
             object->shape = new JoltSdfShape(std::get<std::shared_ptr<const SdfShape>>(b.settings.shape));
         }
         const bool fixed = b.settings.motion == Motion::Static, dynamic = b.settings.motion == Motion::Dynamic;
-        BodyCreationSettings settings(object->shape, to_jolt(b.settings.pose.position), to_jolt(b.settings.pose.rotation).Normalized(),
+        BodyCreationSettings settings(object->shape, to_jolt(b.settings.pose.position),
+                                      to_jolt(b.settings.pose.rotation).Normalized(),
                                       fixed     ? EMotionType::Static
                                       : dynamic ? EMotionType::Dynamic
                                                 : EMotionType::Kinematic,
@@ -254,8 +265,13 @@ private:
         const std::lock_guard lock(mutex_);
         touching_.push_back({std::min(a, b), std::max(a, b), manifold.mPenetrationDepth});
     }
-    void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings&) override { note(a, b, m); }
-    void OnContactPersisted(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings&) override { note(a, b, m); }
+    void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings&) override {
+        note(a, b, m);
+    }
+    void OnContactPersisted(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m,
+                            ContactSettings&) override {
+        note(a, b, m);
+    }
 
     Layers layers_;
     TempAllocatorImplWithMallocFallback scratch_;

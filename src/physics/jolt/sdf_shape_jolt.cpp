@@ -64,34 +64,36 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
         const vec3 normal = rotate(world.rotation, c.normal), on1 = world * c.point;
         const uint32 number = number_of(c.normal);
         const SubShapeID part1 = field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID();
-        collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth, part1,
-                                            id2.PushID(number, 2 * kNormalBits).GetID(),
+        collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
+                                            part1, id2.PushID(number, 2 * kNormalBits).GetID(),
                                             TransformedShape::sGetBodyID(collector.GetContext())));
     }
 }
 
-void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1, Mat44Arg transform2,
-                    const SubShapeIDCreator& id1, const SubShapeIDCreator& id2, const CollideShapeSettings& settings,
-                    CollideShapeCollector& collector, const ShapeFilter&) {
+void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
+                    Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+                    const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
     static thread_local std::vector<FieldContact> contacts;
     const Pose world = world_of(field_of(shape2), transform2);
-    collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1), settings.mMaxSeparationDistance,
-            contacts);
+    collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1),
+            settings.mMaxSeparationDistance, contacts);
     add(contacts, world, false, id1, id2, collector);
 }
 
-void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1, Mat44Arg transform2,
-                    const SubShapeIDCreator& id1, const SubShapeIDCreator& id2, const CollideShapeSettings& settings,
-                    CollideShapeCollector& collector, const ShapeFilter&) {
+void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
+                    Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+                    const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
     static thread_local std::vector<FieldContact> contacts;
     const Pose world1 = world_of(field_of(shape1), transform1), world2 = world_of(field_of(shape2), transform2);
-    collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance, contacts);
+    collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance,
+            contacts);
     add(contacts, world2, true, id1, id2, collector);
 }
 
 // Given relative to the centre of mass of shape 2. A field is cast as the largest ball in it.
-void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH::Shape* shape2, Vec3Arg, const ShapeFilter&,
-          Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2, CastShapeCollector& collector) {
+void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH::Shape* shape2, Vec3Arg,
+          const ShapeFilter&, Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+          CastShapeCollector& collector) {
     const bool field1 = moving.mShape->GetSubType() == kType;
     const Convex body = field1 ? Convex::sphere(field_of(moving.mShape).GetInnerRadius()) : convex_of(moving.mShape);
     const JoltSdfShape& field = field_of(shape2);
@@ -104,15 +106,16 @@ void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH:
     if (back_face && settings.mBackFaceModeConvex == EBackFaceMode::IgnoreBackFaces) return;
     const Vec3 point = transform2 * to_jolt(hit->point - field.center());
     const uint32 number = number_of(hit->normal);
-    collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)), back_face,
-                                     field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID(),
+    collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)),
+                                     back_face, field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID(),
                                      id2.PushID(number, 2 * kNormalBits).GetID(),
                                      TransformedShape::sGetBodyID(collector.GetContext())));
 }
 
 }  // namespace
 
-JoltSdfShape::JoltSdfShape(std::shared_ptr<const SdfShape> sdf) : Shape(EShapeType::User1, kType), sdf_(std::move(sdf)) {}
+JoltSdfShape::JoltSdfShape(std::shared_ptr<const SdfShape> sdf)
+    : Shape(EShapeType::User1, kType), sdf_(std::move(sdf)) {}
 
 void JoltSdfShape::register_pairs() {
     ShapeFunctions& functions = ShapeFunctions::sGet(kType);
@@ -153,15 +156,16 @@ void JoltSdfShape::GetSubmergedVolume(Mat44Arg, Vec3Arg, const JPH::Plane&, floa
 }
 
 bool JoltSdfShape::CastRay(const RayCast& ray, const SubShapeIDCreator& id, RayCastResult& hit) const {
-    const auto found = cast_ray(sdf_->field(), to_vec(ray.mOrigin) + center(), to_vec(ray.mDirection), std::min(hit.mFraction, 1.0f));
+    const auto found =
+        cast_ray(sdf_->field(), to_vec(ray.mOrigin) + center(), to_vec(ray.mDirection), std::min(hit.mFraction, 1.0f));
     if (!found || found->fraction >= hit.mFraction) return false;
     hit.mFraction = found->fraction;
     hit.mSubShapeID2 = id.PushID(number_of(found->normal), 2 * kNormalBits).GetID();
     return true;
 }
 
-void JoltSdfShape::CastRay(const RayCast& ray, const RayCastSettings&, const SubShapeIDCreator& id, CastRayCollector& collector,
-                           const ShapeFilter& filter) const {
+void JoltSdfShape::CastRay(const RayCast& ray, const RayCastSettings&, const SubShapeIDCreator& id,
+                           CastRayCollector& collector, const ShapeFilter& filter) const {
     if (!filter.ShouldCollide(this, id.GetID())) return;
     RayCastResult hit;
     hit.mFraction = collector.GetEarlyOutFraction();
@@ -176,8 +180,8 @@ void JoltSdfShape::CollidePoint(Vec3Arg point, const SubShapeIDCreator& id, Coll
         collector.AddHit({TransformedShape::sGetBodyID(collector.GetContext()), id.GetID()});
 }
 
-void JoltSdfShape::CollideSoftBodyVertices(Mat44Arg transform, Vec3Arg, const CollideSoftBodyVertexIterator& vertices, uint count,
-                                           int shape_index) const {
+void JoltSdfShape::CollideSoftBodyVertices(Mat44Arg transform, Vec3Arg, const CollideSoftBodyVertexIterator& vertices,
+                                           uint count, int shape_index) const {
     const Mat44 local = transform.InversedRotationTranslation();
     for (CollideSoftBodyVertexIterator v = vertices, end = vertices + count; v != end; ++v) {
         if (v.GetInvMass() <= 0) continue;

@@ -45,11 +45,15 @@ public:
                  JPH::CastRayCollector& collector, const JPH::ShapeFilter& filter) const override;
     void CollidePoint(JPH::Vec3Arg point, const JPH::SubShapeIDCreator& id, JPH::CollidePointCollector& collector,
                       const JPH::ShapeFilter& filter) const override;
-    void CollideSoftBodyVertices(JPH::Mat44Arg transform, JPH::Vec3Arg scale, const JPH::CollideSoftBodyVertexIterator& vertices,
-                                 JPH::uint count, int shape_index) const override;
+    void CollideSoftBodyVertices(JPH::Mat44Arg transform, JPH::Vec3Arg scale,
+                                 const JPH::CollideSoftBodyVertexIterator& vertices, JPH::uint count,
+                                 int shape_index) const override;
     // Fields have no triangles.
-    void GetTrianglesStart(GetTrianglesContext&, const JPH::AABox&, JPH::Vec3Arg, JPH::QuatArg, JPH::Vec3Arg) const override {}
-    int GetTrianglesNext(GetTrianglesContext&, int, JPH::Float3*, const JPH::PhysicsMaterial**) const override { return 0; }
+    void GetTrianglesStart(GetTrianglesContext&, const JPH::AABox&, JPH::Vec3Arg, JPH::QuatArg,
+                           JPH::Vec3Arg) const override {}
+    int GetTrianglesNext(GetTrianglesContext&, int, JPH::Float3*, const JPH::PhysicsMaterial**) const override {
+        return 0;
+    }
     Stats GetStats() const override { return {sizeof(*this), 0}; }
     float GetVolume() const override { return float(sdf_->mass().mass); }
 
