@@ -137,6 +137,16 @@ void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
     if (find(id) != nullptr && finite(linear) && finite(angular)) push(id.index, linear, angular);
 }
 
+void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed) {
+    const Body* b = find(id);
+    KILN_ASSERT(b == nullptr || (b->settings.motion == Motion::Static && is_field(b->settings.shape)), "body {}",
+                id.index);
+    if (b == nullptr) return;
+    bodies_[id.index].settings.shape = field;
+    swap(id.index, std::move(field));
+    wake(changed);
+}
+
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
     for (uint32_t i = 0; i < bodies_.size(); ++i)

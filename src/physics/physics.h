@@ -86,13 +86,16 @@ public:
     vec3 center_of_mass(BodyId id) const { return mass_of(id).center; }
     void set_pose(BodyId id, const Pose& pose);
     void set_velocity(BodyId id, vec3 linear, vec3 angular);
+    /// Another field for a static body that has one, as edits make it. `changed` holds where in the world the two differ: what lies there
+    /// wakes, and falls, or is pushed out, with the next step.
+    void set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed);
 
     /// Gravity acts, then contacts, then the bodies move, by `seconds` > 0. A body whose state is not finite afterwards goes back to where
     /// it was and rests; lost() counts them.
     void step(float seconds);
     int lost() const { return lost_; }
 
-    /// The field of a body has changed in this box of the world: contacts there are looked for anew and sleepers wake.
+    /// Sleepers whose boxes meet this one wake, and what they touched is forgotten.
     virtual void wake(const Box3& box) = 0;
     /// Of the last step, by a, then b.
     std::span<const ContactEvent> events() const { return events_; }
@@ -128,6 +131,7 @@ protected:
     virtual BodyState get(uint32_t index) const = 0;
     virtual void put(uint32_t index, const Pose& pose) = 0;
     virtual void push(uint32_t index, vec3 linear, vec3 angular) = 0;
+    virtual void swap(uint32_t index, std::shared_ptr<const SdfShape> field) = 0;
     virtual void advance(float seconds) = 0;
     /// Pairs of bodies that touch now, in any order, with the lower index first.
     struct Pair {

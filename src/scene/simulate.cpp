@@ -30,17 +30,23 @@ std::optional<physics::Convex> convex_of(std::span<const Edit> edits) {
     if (edits.size() != 1) return std::nullopt;
     const Edit& e = edits[0];
     const vec3 scale = e.node.transform.scale;
-    if (e.hidden || e.node.kind != Node::Kind::Shape || !e.node.domain.empty() || scale.x != scale.y || scale.x != scale.z)
+    if (e.hidden || e.node.kind != Node::Kind::Shape || !e.node.domain.empty() || scale.x != scale.y ||
+        scale.x != scale.z)
         return std::nullopt;
     // Parameters are a shape's fields in the order of their declaration.
     const auto& p = e.node.shape.params;
     const float s = scale.x;
     switch (ShapeKind(e.node.shape.kind)) {
-    case ShapeKind::Sphere: return physics::Convex::sphere(s * p[0]);
-    case ShapeKind::Box: return physics::Convex::box({s * p[0], s * p[1], s * p[2]});
-    case ShapeKind::Capsule: return physics::Convex::capsule(s * p[0], s * p[1]);
-    case ShapeKind::Cylinder: return physics::Convex::cylinder(s * p[0], s * p[1]);
-    default: return std::nullopt;
+    case ShapeKind::Sphere:
+        return physics::Convex::sphere(s * p[0]);
+    case ShapeKind::Box:
+        return physics::Convex::box({s * p[0], s * p[1], s * p[2]});
+    case ShapeKind::Capsule:
+        return physics::Convex::capsule(s * p[0], s * p[1]);
+    case ShapeKind::Cylinder:
+        return physics::Convex::cylinder(s * p[0], s * p[1]);
+    default:
+        return std::nullopt;
     }
 }
 
@@ -92,11 +98,12 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     const scene::SceneData& data = impl_->data;
     const double step = double(data.physics.step), steps = std::round(settings.seconds / step);
     if (!std::isfinite(settings.seconds) || settings.seconds < 0 || !(steps <= kMostSteps))
-        return Error{formatted("simulating {} s: write a finite time of 0 or more, at most {} steps of {} s", settings.seconds,
-                               kMostSteps, data.physics.step),
+        return Error{formatted("simulating {} s: write a finite time of 0 or more, at most {} steps of {} s",
+                               settings.seconds, kMostSteps, data.physics.step),
                      ErrorKind::Usage};
     if (!std::isfinite(settings.every) || settings.every < 0 || settings.threads < 0)
-        return Error{"simulating: the time between frames and the number of threads must be 0 or more", ErrorKind::Usage};
+        return Error{"simulating: the time between frames and the number of threads must be 0 or more",
+                     ErrorKind::Usage};
     const int threads = settings.threads > 0 ? settings.threads : std::max(1, int(std::thread::hardware_concurrency()));
     auto made = physics::make_world(settings.backend, {.gravity = data.physics.gravity, .threads = threads});
     if (!made) return made.error();
@@ -146,7 +153,9 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
         }
     }
     for (const scene::SceneBody& body : data.bodies) {
-        if (body.edits.empty()) return fault(body, "bodies of meshes are not simulated yet; give it edits, such as one of the shape \"mesh\"");
+        if (body.edits.empty())
+            return fault(body,
+                         "bodies of meshes are not simulated yet; give it edits, such as one of the shape \"mesh\"");
         std::vector<Edit> edits;
         for (const std::string& name : body.edits) {
             const auto at = impl_->position_of(name);
@@ -197,8 +206,19 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
         const char* between = "";
         for (const Ran& r : ran) {
             const physics::BodyState state = world.state(r.id);
-            text.raw(between).raw("\n    {").key("id").raw(r.quoted).raw(", ").key("position").vector(state.pose.position);
-            text.raw(", ").key("rotation").rotation(state.pose.rotation).raw(", ").key("linear_velocity").vector(state.linear_velocity);
+            text.raw(between)
+                .raw("\n    {")
+                .key("id")
+                .raw(r.quoted)
+                .raw(", ")
+                .key("position")
+                .vector(state.pose.position);
+            text.raw(", ")
+                .key("rotation")
+                .rotation(state.pose.rotation)
+                .raw(", ")
+                .key("linear_velocity")
+                .vector(state.linear_velocity);
             text.raw(", ").key("angular_velocity").vector(state.angular_velocity).raw(", ").key("asleep");
             text.raw(state.asleep ? "true}" : "false}");
             between = ",";

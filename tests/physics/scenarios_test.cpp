@@ -261,7 +261,50 @@ TEST_P(EachEngine, GroundTakenAwayUnderASleeperLetsItFallOnTheNextStep) {
     }
 }
 
-TEST_P(EachEngine, TenThousandStepsOverTerrainLoseNobody) {
+TEST_P(EachEngine, DiggingUnderASleeperLetsItFallOnTheNextStepAndOnlyThere) {
+    for (const bool as_field : {false, true}) {
+        Scene s(GetParam());
+        const std::vector<Edit> before{edit(kiln::Box{.half_extents = {20, 1, 20}}, {0, -1, 0})};
+        std::vector<Edit> after = before;
+        after.push_back(edit(kiln::Sphere{.radius = 1.2f}, {}, Op::Subtract));
+        const BodyId ground = s.ground(before);
+        const Solid box = solids()[1];
+        const BodyId id = s.add({.shape = as_field ? box.field() : box.exact(), .pose = {{0, 0.5f, 0}, {}}});
+        const BodyId far = s.add({.shape = box.exact(), .pose = {{8, 0.5f, 0}, {}}});
+        s.run(3);
+        ASSERT_TRUE(s.world->state(id).asleep && s.world->state(far).asleep);
+        s.world->set_field(ground, SdfShape::fixed(field_of(after)), {{-1.2f, -1.2f, -1.2f}, {1.2f, 1.2f, 1.2f}});
+        s.world->step(kStep);
+        EXPECT_NEAR(s.world->state(id).linear_velocity.y, -kGravity / 60, 0.01f * kGravity / 60) << as_field;
+        EXPECT_TRUE(s.world->state(far).asleep);
+        s.run(3);
+        EXPECT_LT(s.world->state(id).pose.position.y, -0.3f) << as_field;
+        EXPECT_GT(s.world->state(id).pose.position.y, -0.75f) << as_field;
+        EXPECT_NEAR(s.world->state(far).pose.position.y, 0.5f, 0.01f);
+    }
+}
+
+TEST_P(EachEngine, BuildingInsideASleeperPushesItOutWithoutAShot) {
+    Scene s(GetParam());
+    const std::vector<Edit> before{edit(Plane{})};
+    std::vector<Edit> after = before;
+    after.push_back(edit(kiln::Sphere{.radius = 1}, {0.1f, 0, 0}));
+    const BodyId ground = s.ground(before);
+    const BodyId id = s.add({.shape = Convex::box({0.4f, 0.4f, 0.4f}), .pose = {{0, 0.4f, 0}, {}}});
+    s.run(3);
+    const auto field = field_of(after);
+    s.world->set_field(ground, SdfShape::fixed(field), {{-1, -1, -1}, {1.2f, 1, 1}});
+    float fastest = 0;
+    for (int i = 0; i < 240; ++i) {
+        s.world->step(kStep);
+        fastest = std::max(fastest, length(s.world->state(id).linear_velocity));
+    }
+    EXPECT_LT(fastest, 8);
+    EXPECT_GT(field->distance(s.world->state(id).pose.position), 0.35f);
+    EXPECT_EQ(s.world->lost(), 0);
+}
+
+TEST_P(EachEngine, EightSecondsOverTerrainLoseNobody) {
     Scene s(GetParam());
     std::vector<Edit> edits{edit(Plane{})};
     std::mt19937 rng(3);

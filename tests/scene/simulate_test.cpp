@@ -162,14 +162,17 @@ TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
     const std::string hollow = R"({"format": 1,
  "edits": [{"id": "a", "shape": "sphere", "radius": 0.2}, {"id": "b", "shape": "sphere", "radius": 0.3, "op": "subtract"}],
  "bodies": [{"id": "x", "edits": ["a", "b"]}]})";
-    EXPECT_THAT(message(hollow), testing::AllOf(HasSubstr("s.kiln.json:3:"), HasSubstr("bodies[0]"), HasSubstr("no volume")));
-    EXPECT_THAT(message(R"({"format": 1, "edits": [{"id": "a", "shape": "plane"}], "bodies": [{"id": "x", "edits": ["a"]}]})"),
-                HasSubstr("without end"));
+    EXPECT_THAT(message(hollow),
+                testing::AllOf(HasSubstr("s.kiln.json:3:"), HasSubstr("bodies[0]"), HasSubstr("no volume")));
+    EXPECT_THAT(
+        message(R"({"format": 1, "edits": [{"id": "a", "shape": "plane"}], "bodies": [{"id": "x", "edits": ["a"]}]})"),
+        HasSubstr("without end"));
     EXPECT_THAT(message(R"({"format": 1, "edits": [{"id": "a", "shape": "sphere"}],
       "bodies": [{"id": "x", "edits": ["a"]}, {"id": "y", "edits": ["a"]}]})"),
                 testing::AllOf(HasSubstr("bodies[1].edits[0]"), HasSubstr("body \"x\" already")));
-    EXPECT_THAT(message(R"({"format": 1, "meshes": [{"id": "m", "file": "m.glb"}], "bodies": [{"id": "x", "mesh": "m"}]})"),
-                HasSubstr("bodies of meshes"));
+    EXPECT_THAT(
+        message(R"({"format": 1, "meshes": [{"id": "m", "file": "m.glb"}], "bodies": [{"id": "x", "mesh": "m"}]})"),
+        HasSubstr("bodies of meshes"));
     EXPECT_THAT(message(kTumble, {.backend = "no such"}), testing::AllOf(HasSubstr("no such"), HasSubstr("bullet")));
     EXPECT_THAT(message(kTumble, {.seconds = NAN}), HasSubstr("finite"));
     EXPECT_THAT(message(kTumble, {.seconds = -1}), HasSubstr("0 or more"));

@@ -113,14 +113,17 @@ public:
     void wake(const Box3& box) override {
         std::vector<uint32_t> found;
         near(box.inflated(0.1f), found);
+        std::erase_if(found, [&](uint32_t i) { return objects_[i]->body->isStaticObject(); });
+        std::vector<bool> woken(objects_.size());
         for (const uint32_t i : found) {
-            btRigidBody& body = *objects_[i]->body;
-            // Impulses of contacts that may be gone are forgotten.
-            for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
-                btPersistentManifold* manifold = dispatcher_.getManifoldByIndexInternal(m);
-                if (manifold->getBody0() == &body || manifold->getBody1() == &body) manifold->clearManifold();
-            }
-            if (!body.isStaticOrKinematicObject()) body.activate(true);
+            woken[i] = true;
+            objects_[i]->body->activate(true);
+        }
+        for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
+            btPersistentManifold* manifold = dispatcher_.getManifoldByIndexInternal(m);
+            if (woken[size_t(manifold->getBody0()->getUserIndex())] ||
+                woken[size_t(manifold->getBody1()->getUserIndex())])
+                manifold->clearManifold();
         }
     }
 
@@ -199,6 +202,11 @@ protected:
         b.setLinearVelocity(to_bullet(linear));
         b.setAngularVelocity(to_bullet(angular));
         b.activate(true);
+    }
+
+    void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
+        static_cast<BulletSdfShape&>(*objects_[index]->shape).set(std::move(field));
+        dynamics_.updateSingleAabb(objects_[index]->body.get());
     }
 
     void advance(float seconds) override {

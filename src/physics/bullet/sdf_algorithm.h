@@ -24,6 +24,7 @@ class BulletSdfShape final : public btConcaveShape {
 public:
     BulletSdfShape(std::shared_ptr<const SdfShape> shape, const Pose& field_from_body);
     const SdfShape& sdf() const { return *sdf_; }
+    void set(std::shared_ptr<const SdfShape> shape) { sdf_ = std::move(shape); }
     const Pose& field_from_body() const { return field_from_body_; }
 
     void getAabb(const btTransform& t, btVector3& low, btVector3& high) const override;

@@ -116,8 +116,9 @@ public:
         std::vector<uint32_t> found;
         near(box.inflated(0.1f), found);
         for (const uint32_t i : found) {
+            if (bodies()[i].settings.motion == Motion::Static) continue;
             interface().InvalidateContactCache(objects_[i]->id);
-            if (bodies()[i].settings.motion != Motion::Static) interface().ActivateBody(objects_[i]->id);
+            interface().ActivateBody(objects_[i]->id);
         }
     }
 
@@ -209,6 +210,12 @@ protected:
         if (bodies()[index].settings.motion == Motion::Static) return;
         interface().SetLinearAndAngularVelocity(objects_[index]->id, to_jolt(linear), to_jolt(angular));
         interface().ActivateBody(objects_[index]->id);
+    }
+
+    void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
+        auto& shape = static_cast<JoltSdfShape&>(*objects_[index]->shape);
+        shape.set(std::move(field));
+        interface().NotifyShapeChanged(objects_[index]->id, shape.GetCenterOfMass(), false, EActivation::DontActivate);
     }
 
     void advance(float seconds) override {

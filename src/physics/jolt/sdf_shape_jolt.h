@@ -24,6 +24,8 @@ public:
     static void register_pairs();
 
     const SdfShape& sdf() const { return *sdf_; }
+    /// Between steps, and then the body must be told. The centre of mass stays: only for what stands.
+    void set(std::shared_ptr<const SdfShape> sdf) { sdf_ = std::move(sdf); }
     /// From Jolt's frame to the field's.
     vec3 center() const { return sdf_->mass().center; }
 
