@@ -93,9 +93,11 @@ function(kiln_jolt)
     add_library(kiln::physics_jolt ALIAS kiln_physics_jolt)
     set_target_properties(kiln_physics_jolt PROPERTIES EXPORT_NAME physics_jolt)
     target_include_directories(kiln_physics_jolt PRIVATE ${KILN_INCLUDE_ROOTS} ${KILN_PRIVATE_ROOTS})
-    # What Jolt's headers declare depends on NDEBUG, and installed libraries are built with it. Jolt is mostly built without run-time types.
+    # What Jolt's headers declare depends on NDEBUG, and installed libraries are built with it. Jolt is mostly built without run-time types:
+    # then a class made from its Shape can have none either, and cannot be checked for them.
     target_compile_definitions(kiln_physics_jolt PRIVATE NDEBUG)
-    target_compile_options(kiln_physics_jolt PRIVATE -fno-rtti -fno-sanitize=vptr)
+    target_compile_options(kiln_physics_jolt PRIVATE -fno-sanitize=vptr)
+    set_source_files_properties(${PROJECT_SOURCE_DIR}/src/physics/jolt/sdf_shape_jolt.cpp PROPERTIES COMPILE_OPTIONS -fno-rtti)
     target_link_libraries(kiln_physics_jolt PRIVATE Jolt::Jolt kiln_physics)
     target_link_libraries(kiln_physics PRIVATE kiln_physics_jolt)
     target_compile_definitions(kiln_physics PRIVATE KILN_JOLT)
