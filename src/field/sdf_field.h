@@ -10,6 +10,7 @@
 #include <kiln/math.h>
 
 #include <memory>
+#include <span>
 
 namespace kiln::field {
 
@@ -21,6 +22,8 @@ public:
     virtual float distance(vec3 p) const = 0;
     /// Also the gradient, not normalised; 0 where it vanishes or nothing exists.
     virtual float distance(vec3 p, vec3& gradient) const = 0;
+    /// The same for many points, near each other: out[i], gradients[i].
+    virtual void distances(std::span<const vec3> points, float* out, vec3* gradients) const;
     /// out[i] = distance at point i; neighbours of the list should be neighbours in space.
     virtual void distances(const sdf::Points& points, float* out) const = 0;
     /// Holds the solid; infinite faces where it has no end there, empty when there is none.
@@ -34,6 +37,7 @@ public:
 
     float distance(vec3 p) const override;
     float distance(vec3 p, vec3& gradient) const override;
+    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
     void distances(const sdf::Points& points, float* out) const override;
     Box3 bounds() const override { return bounds_; }
     const sdf::Program& program() const { return *program_; }

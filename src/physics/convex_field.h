@@ -12,6 +12,7 @@ public:
     explicit ConvexField(const Convex& convex) : convex_(convex) {}
     float distance(vec3 p) const override;
     float distance(vec3 p, vec3& gradient) const override;
+    using SdfField::distances;
     void distances(const sdf::Points& points, float* out) const override;
     Box3 bounds() const override { return {-half_extents(convex_), half_extents(convex_)}; }
 

@@ -12,6 +12,10 @@ namespace kiln::physics {
 namespace {
 
 constexpr int kDescentSteps = 12;
+constexpr float kEnough = 2e-4f;  // of the body's radius: a step that gains or loses less ends a descent
+constexpr float kAlike =
+    0.9f;  // cosine: starts that the field faces so like a place already found lead there, after kSure descents
+constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
 constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
@@ -24,13 +28,17 @@ struct Probe {
     vec3 normal;  // unit
 };
 
-// The field at a point. `otherwise` is the normal where it has none.
-Probe probe(const field::SdfField& field, vec3 p, vec3 otherwise) {
-    vec3 g;
-    const float d = field.distance(p, g);
+// From a distance and a gradient. `otherwise` is the normal where there is none.
+Probe probe(vec3 p, float d, vec3 g, vec3 otherwise) {
     const float slope = length(g);
     if (!(slope > 1e-4f)) return {p, -d, otherwise};
     return {p, -d / std::max(slope, kLeastSlope), g / slope};
+}
+
+Probe probe(const field::SdfField& field, vec3 p, vec3 otherwise) {
+    vec3 g;
+    const float d = field.distance(p, g);
+    return probe(p, d, g, otherwise);
 }
 
 // A body over a field: points in the body's frame, answers in the field's.
@@ -40,6 +48,15 @@ struct Over {
     const Pose& pose;
     float radius;
     Probe at(vec3 local, vec3 otherwise) const { return probe(field, pose * local, otherwise); }
+    // Many at once.
+    template <size_t N>
+    void at(const std::array<vec3, N>& local, size_t count, vec3 otherwise, std::array<Probe, N>& out) const {
+        std::array<vec3, N> p, g;
+        std::array<float, N> d;
+        for (size_t i = 0; i < count; ++i) p[i] = pose * local[i];
+        field.distances(std::span(p.data(), count), d.data(), g.data());
+        for (size_t i = 0; i < count; ++i) out[i] = probe(p[i], d[i], g[i], otherwise);
+    }
 
     struct Lowest {
         vec3 local;
@@ -53,11 +70,13 @@ struct Over {
             const vec3 move = next - local;
             if (dot(move, move) < 1e-8f * radius * radius) break;
             const Probe there = at(next, now.normal);
-            if (there.depth > now.depth + 1e-6f * radius) {
+            const float gain = there.depth - now.depth;
+            if (gain > 0) {
                 local = next, now = there;
             } else {
                 step *= 0.25f;
             }
+            if (std::abs(gain) < kEnough * radius) break;
         }
         return {local, now};
     }
@@ -91,10 +110,12 @@ int add_face(const Over& over, const Probe& lowest, float margin, Contacts& cont
     std::array<vec3, kMostCorners> corners;
     const size_t n = size_t(face(over.body, direction_into(over.pose, -lowest.normal), corners));
     if (n < 2) return 0;
+    std::array<Probe, kMostCorners> probes;
+    over.at(corners, n, lowest.normal, probes);
     std::array<bool, kMostCorners> in{};
     int count = 0;
     for (size_t i = 0; i < n; ++i) {
-        in[i] = contacts.add(over.at(corners[i], lowest.normal));
+        in[i] = contacts.add(probes[i]);
         count += in[i];
     }
     const size_t edges = n == 2 ? 1 : n;
@@ -102,7 +123,7 @@ int add_face(const Over& over, const Probe& lowest, float margin, Contacts& cont
         const size_t j = (i + 1) % n;
         if (in[i] == in[j]) continue;
         float inside = in[i] ? 0.0f : 1.0f, outside = 1 - inside;
-        Probe edge = over.at(in[i] ? corners[i] : corners[j], lowest.normal);
+        Probe edge = probes[in[i] ? i : j];
         for (int step = 0; step < kBisections; ++step) {
             const float t = 0.5f * (inside + outside);
             const Probe middle = over.at(corners[i] + (corners[j] - corners[i]) * t, lowest.normal);
@@ -123,7 +144,8 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
              std::vector<FieldContact>& out) {
     out.clear();
     const Over over{field, body, field_from_body, outer_radius(body)};
-    const float center = field.distance(field_from_body.position);
+    vec3 gradient;
+    const float center = field.distance(field_from_body.position, gradient);
     if (center > over.radius + margin) return;  // 1-Lipschitz: nothing within reach
     Contacts contacts(out, margin, kSamePlace * over.radius);
     const vec3 up{0, 1, 0};
@@ -131,7 +153,7 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
     // A ball's lowest point is as far below its centre's value as its radius, wherever one place of the surface is the nearest.
     constexpr size_t count = kStarts;
     if (body.kind == Convex::Kind::Sphere) {
-        const Over::Lowest low = over.descend({}, over.at({}, up));
+        const Over::Lowest low = over.descend({}, probe(field_from_body.position, center, gradient, up));
         if (low.probe.depth > over.radius - center - kSamePlace * over.radius) {
             contacts.add(low.probe);
             return;
@@ -139,18 +161,23 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
     }
     std::array<Probe, kStarts> first;
     std::array<size_t, kStarts> order{};
-    for (size_t i = 0; i < count; ++i) first[i] = over.at(from[i], up), order[i] = i;
+    over.at(from, count, up, first);
+    for (size_t i = 0; i < count; ++i) order[i] = i;
     std::sort(order.begin(), order.end(), [&](size_t a, size_t b) {
         return first[a].depth != first[b].depth ? first[a].depth > first[b].depth : a < b;
     });
-    std::array<vec3, kStarts> flat;  // normals of places that a face already covers
-    size_t flats = 0;
+    std::array<vec3, kStarts> flat, seen;  // normals of places that a face already covers, and of all that were found
+    size_t flats = 0, descents = 0;
+    const auto like = [](const std::array<vec3, kStarts>& normals, size_t n, vec3 normal, float cosine) {
+        return std::any_of(normals.begin(), normals.begin() + std::ptrdiff_t(n),
+                           [&](vec3 m) { return dot(m, normal) > cosine; });
+    };
     for (size_t i = 0; i < count; ++i) {
         const Probe& start = first[order[i]];
-        if (std::any_of(flat.begin(), flat.begin() + std::ptrdiff_t(flats),
-                        [&](vec3 n) { return dot(n, start.normal) > kSameNormal; }))
-            continue;
+        if (like(flat, flats, start.normal, kSameNormal)) continue;
+        if (descents >= kSure && like(seen, descents, start.normal, kAlike)) continue;
         const Over::Lowest low = over.descend(from[order[i]], start);
+        seen[descents++] = low.probe.normal;
         if (!contacts.add(low.probe)) continue;
         if (add_face(over, low.probe, margin, contacts) >= 3) flat[flats++] = low.probe.normal;
     }
