@@ -231,17 +231,24 @@ protected:
             }
             damped_for_ = seconds;
         }
-        std::vector<Pair> before = std::move(touching_);
-        touching_.clear();
+        std::vector<Pair> before;
+        {
+            const std::lock_guard lock(mutex_);
+            before.swap(touching_);
+        }
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
         // Sleepers say nothing; they still touch what they touched.
         const BodyInterface& bodies_interface = system_.GetBodyInterfaceNoLock();
         const auto rests = [&](uint32_t i) { return objects_[i] && !bodies_interface.IsActive(objects_[i]->id); };
+        const std::lock_guard lock(mutex_);
         for (const Pair& p : before)
             if (rests(p.a) && rests(p.b)) touching_.push_back(p);
     }
 
-    void collect(std::vector<Pair>& pairs) const override { pairs = touching_; }
+    void collect(std::vector<Pair>& pairs) const override {
+        const std::lock_guard lock(mutex_);
+        pairs = touching_;
+    }
 
     void near(const Box3& box, std::vector<uint32_t>& out) const override {
         AllHitCollisionCollector<CollideShapeBodyCollector> hits;
@@ -263,6 +270,7 @@ private:
         interface().RemoveBody(objects_[index]->id);
         interface().DestroyBody(objects_[index]->id);
         objects_[index].reset();
+        const std::lock_guard lock(mutex_);
         std::erase_if(touching_, [&](const Pair& p) { return p.a == index || p.b == index; });
     }
 
@@ -285,7 +293,7 @@ private:
     std::unique_ptr<JobSystem> jobs_;
     PhysicsSystem system_;
     std::vector<std::unique_ptr<Object>> objects_;
-    std::mutex mutex_;
+    mutable std::mutex mutex_;  // of touching_
     std::vector<Pair> touching_;
     float damped_for_ = 0;  // the step that dampings are set for
 };
