@@ -145,6 +145,44 @@ TEST_P(EachEngine, ABoxStaysBelowTheAngleOfFrictionAndSlidesAbove) {
     }
 }
 
+TEST_P(EachEngine, FrictionOfAPairIsTheGeometricMeanAndBounceTheLarger) {
+    for (const float ratio : {0.97f, 1.03f}) {
+        const float degrees = std::atan(0.4f * ratio) * 180 / kPi;
+        Scene s(GetParam());
+        s.ground({inclined_plane(degrees)}, 0.2f);
+        const BodyId id = s.add({.shape = Convex::box({0.5f, 0.2f, 0.5f}),
+                                 .pose = {out_of(degrees) * 0.2f, axis_angle({0, 0, 1}, -degrees * kPi / 180)},
+                                 .friction = 0.8f});
+        s.run(4);
+        EXPECT_EQ(dot(s.world->state(id).pose.position, downhill(degrees)) > 0.1f, ratio > 1) << ratio;
+    }
+    Scene s(GetParam());
+    s.ground({edit(Plane{})}, 0.5f, 0.8f);
+    const BodyId id = s.add({.shape = Convex::sphere(0.5f), .pose = {{0, 3, 0}, {}}, .restitution = 0.1f});
+    s.run(0.9f);
+    EXPECT_NEAR(s.world->state(id).linear_velocity.y,
+                0.8f * std::sqrt(2 * kGravity * 2.5f) - kGravity * (0.9f - std::sqrt(5 / kGravity)), 0.3f);
+}
+
+TEST_P(EachEngine, AFieldBodyWithANotchComesToRestAndSleeps) {
+    Scene s(GetParam());
+    s.ground({edit(Plane{})});
+    const BodyId id =
+        s.add({.shape = moving({edit(kiln::Torus{.major_radius = 0.6f, .minor_radius = 0.15f}),
+                                edit(kiln::Box{.half_extents = {0.2f, 0.5f, 0.2f}}, {0.6f, 0, 0}, Op::Subtract)}),
+               .pose = {{0, 0.5f, 0}, axis_angle({0, 0, 1}, 0.2f)}});
+    s.run(2.5f);
+    float fastest = 0;
+    for (int i = 0; i < 30; ++i) {
+        s.world->step(kStep);
+        fastest = std::max(fastest, length(s.world->state(id).angular_velocity));
+    }
+    EXPECT_LT(fastest, 0.05f) << "it trembles";
+    s.run(2);
+    EXPECT_TRUE(s.world->state(id).asleep);
+    EXPECT_NEAR(s.world->state(id).pose.position.y, 0.15f, 0.02f);
+}
+
 TEST_P(EachEngine, ThingsComeToRestOnAPlaneWithoutSinkingDriftingOrJitter) {
     for (const bool as_field : {false, true}) {
         for (const Solid& solid : solids()) {

@@ -105,6 +105,32 @@ TEST(SdfCollision, ABoxOverAnEdgeIsHeldAtTheEdge) {
     EXPECT_NEAR(farthest, 0, 0.03f);
 }
 
+TEST(SdfCollision, ABallOnTheAxisOfARingTouchesIt) {
+    // Straight down from the centre the field has a saddle: the ring is nearest on a circle around.
+    const auto ring = field_of({edit(kiln::Torus{.major_radius = 1, .minor_radius = 0.2f})});
+    std::vector<FieldContact> contacts;
+    for (const float gap : {0.005f, -0.005f}) {
+        const float r = 0.9f, height = std::sqrt((r + 0.2f + gap) * (r + 0.2f + gap) - 1);
+        collide(*ring, Convex::sphere(r), {{0, height, 0}, {}}, 0.02f, contacts);
+        ASSERT_GE(contacts.size(), 3u) << gap;
+        for (const FieldContact& c : contacts) EXPECT_NEAR(c.depth, -gap, 1e-3f);
+        vec3 push;
+        for (const FieldContact& c : contacts) push = push + c.normal;
+        EXPECT_LT(std::hypot(push.x, push.z), 0.3f * push.y) << "they hold it from all sides";
+    }
+}
+
+TEST(SdfCollision, ABuriedBodyIsToldToRiseOnlySoFar) {
+    const auto plane = field_of({edit(Plane{})});
+    std::vector<FieldContact> contacts;
+    for (const Convex& body : kConvexes) {
+        collide(*plane, body, {{0, -3, 0}, {}}, 0.02f, contacts);
+        ASSERT_FALSE(contacts.empty());
+        EXPECT_EQ(deepest(contacts), kMostDepth);
+        for (const FieldContact& c : contacts) EXPECT_NEAR(c.normal.y, 1, 1e-3f);
+    }
+}
+
 TEST(SdfCollision, ASweepStopsWhereTheBodyTouches) {
     const auto wall = field_of({edit(kiln::Box{.half_extents = {0.05f, 5, 5}})});
     for (const Convex& body : kConvexes) {
