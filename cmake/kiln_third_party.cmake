@@ -35,9 +35,17 @@ function(kiln_third_party header out)
     elseif(header STREQUAL "tiny_gltf.h")
         find_path(KILN_TINYGLTF tiny_gltf.h REQUIRED)
         find_package(nlohmann_json REQUIRED)  # which it includes
+    elseif(header STREQUAL "btBulletCollisionCommon.h")
+        # Bullet's own BulletConfig.cmake has paths that depend on where it is included from, so we look for ourselves.
+        find_path(KILN_BULLET_INCLUDE btBulletCollisionCommon.h PATH_SUFFIXES bullet REQUIRED)
+        foreach(library BulletDynamics BulletCollision LinearMath)
+            find_library(KILN_${library} ${library} REQUIRED)
+            list(APPEND found ${library})
+            kiln_consumer_needs("" "" "-l${library}")
+        endforeach()
     elseif(header STREQUAL "nlohmann/")
         find_package(nlohmann_json REQUIRED)
-    elseif(NOT header MATCHES "^(oneapi|Imath|vulkan|vk_video)/$")  # these come with one of the above, or are headers alone
+    elseif(NOT header MATCHES "^(oneapi|Imath|vulkan|vk_video|BulletCollision|BulletDynamics|LinearMath|Jolt)/$|^btBulletDynamicsCommon.h$")  # these come with one of the above, or are headers alone
         message(FATAL_ERROR "src/modules.txt: no library known for the header ${header}; add it to cmake/kiln_third_party.cmake")
     endif()
     set(${out} ${${out}} ${found} PARENT_SCOPE)

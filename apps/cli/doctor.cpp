@@ -23,6 +23,12 @@ int doctor(bool json) {
         found.empty() ? "no Vulkan driver found; on Debian or Ubuntu: apt install mesa-vulkan-drivers"
         : usable      ? ""
                       : "no device is usable; a CPU renderer always is: apt install mesa-vulkan-drivers";
+    std::string engines, default_engine;
+    for (const PhysicsBackend& b : physics_backends()) {
+        if (!b.why_not.empty()) continue;
+        if (engines.empty()) default_engine = b.name;
+        engines += (engines.empty() ? "" : ", ") + Json::quoted(b.name);
+    }
     if (json) {
         std::string list;
         for (const DeviceInfo& d : found) {
@@ -34,7 +40,9 @@ int doctor(bool json) {
         }
         Json out;
         out.text("version", version()).number("threads", std::thread::hardware_concurrency());
-        out.raw("devices", "[" + list + "]").raw("physics", "[]").raw("default_physics", "null");
+        out.raw("devices", "[" + list + "]")
+            .raw("physics", "[" + engines + "]")
+            .text("default_physics", default_engine);
         if (!advice.empty()) out.text("advice", advice);
         (void)put(out.line());
         return finish_data();
@@ -44,6 +52,11 @@ int doctor(bool json) {
     for (const DeviceInfo& d : found) {
         (void)put((d.usable ? "usable   " : "unusable ") + d.name + " (" + d.kind + ", " + d.backend + " " +
                   d.api_version + ", " + d.driver + ")" + (d.usable ? "" : ": " + d.why_not) + "\n");
+    }
+    for (const PhysicsBackend& b : physics_backends()) {
+        (void)put((b.why_not.empty() ? "physics  " : "unusable ") + std::string(b.name) +
+                  (b.name == default_engine ? " (default)" : "") +
+                  (b.why_not.empty() ? "" : ": " + std::string(b.why_not)) + "\n");
     }
     if (!advice.empty()) (void)put("mend     " + advice + "\n");
     (void)put("works    query, inspect, validate and schema need no device\n");

@@ -17,8 +17,8 @@ namespace kiln::cli {
 namespace {
 
 constexpr std::string_view kVerbs[] = {"demo",   "render", "query",   "import", "export", "inspect", "validate",
-                                       "schema", "doctor", "compare", "diff",   "new",    "bench"};
-constexpr std::string_view kLaterVerbs[] = {"view", "edit", "simulate"};
+                                       "schema", "doctor", "compare", "diff",   "new",    "bench",   "simulate"};
+constexpr std::string_view kLaterVerbs[] = {"view", "edit"};
 
 // In the list of verbs only the first line of each description; its own help shows all of it.
 class Help : public CLI::Formatter {
@@ -83,6 +83,7 @@ int run(int argc, char** argv) {
     add_new(app, verb);
     add_export(app, verb);
     add_bench(app, verb);
+    add_simulate(app, verb);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {

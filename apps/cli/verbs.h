@@ -24,5 +24,6 @@ void add_diff(CLI::App& app, Run& run);
 void add_new(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
+void add_simulate(CLI::App& app, Run& run);
 
 }  // namespace kiln::cli

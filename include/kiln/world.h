@@ -106,6 +106,15 @@ struct TimedCommand {
 /// The commands by ascending time, those of one time in the file's order. Errors read "FILE:LINE:COLUMN: what; what would be right".
 Result<std::vector<TimedCommand>> read_timed_commands(const std::string& path);
 
+/// How the bodies of a scene are run.
+struct SimulateSettings {
+    double seconds = 1;         ///< round(seconds / the scene's step) fixed steps
+    double every = 0;           ///< seconds between frames of the answer; 0: each step
+    std::string backend{};      ///< one of physics_backends(); empty: the first that works
+    bool field_bodies = false;  ///< also bodies with an exact convex shape collide as fields
+    int threads = 0;            ///< 0: all cores; the answer is the same for any number
+};
+
 class World {
 public:
     World();
@@ -182,6 +191,10 @@ public:
     /// The surface as triangles. Fails where nothing is solid, and where `cell` asks for more than memory holds.
     Result<Mesh> mesh(const MeshSettings& settings = {}) const;
 
+    /// Runs the scene's bodies from their start and tells their ways as JSON (`kiln simulate --json`); the world stays as it is. Fails on
+    /// bodies that cannot be simulated, and on a backend that there is not.
+    Result<std::string> simulate_json(const SimulateSettings& settings = {}) const;
+
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;
     /// The history and the journal (`kiln inspect --history`).
@@ -198,6 +211,13 @@ private:
     friend struct SceneDifference compare_scenes(const World& a, const World& b);
     std::unique_ptr<Impl> impl_;
 };
+
+/// A physics engine that this build has; `why_not` says why it cannot run on this machine, empty when it can.
+struct PhysicsBackend {
+    std::string_view name, why_not;
+};
+/// The default first.
+std::vector<PhysicsBackend> physics_backends();
 
 /// Names and one-line descriptions of the scenes that come with Kiln.
 std::vector<std::pair<std::string, std::string>> bundled_scenes();

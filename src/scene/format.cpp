@@ -2,6 +2,8 @@
 
 #include "scene/format.h"
 
+#include "scene/scene_file.h"
+
 #include <kiln/renderer.h>
 #include <kiln/world.h>
 
@@ -153,10 +155,10 @@ constexpr KeyRow kCameraRows[] = {
     choice("bloom_kind", kBloomKinds, "glow of many sizes, or a blur of what is bright; left out: pyramid"),
 };
 constexpr KeyRow kPhysicsRows[] = {
-    numbers("gravity", 3, kKept, {0, -9.81f, 0}, "m/s²", "any", "acceleration"),
-    number("step", kKept, 0.0166666667f, "s", "(0, 1]", "fixed time step"),
-    number("friction", kKept, 0.5f, "1", ">= 0", "of the world where no material says"),
-    number("restitution", kKept, 0, "1", "[0, 1]", "of the world where no material says"),
+    numbers("gravity", 3, KILN_AT(ScenePhysics, gravity), {0, -9.81f, 0}, "m/s²", "any", "acceleration"),
+    number("step", KILN_AT(ScenePhysics, step), 0.0166666667f, "s", "(0, 1]", "fixed time step"),
+    number("friction", KILN_AT(ScenePhysics, friction), 0.5f, "1", ">= 0", "of the world where no material says"),
+    number("restitution", KILN_AT(ScenePhysics, restitution), 0, "1", "[0, 1]", "of the world where no material says"),
 };
 constexpr KeyRow kBodyRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
@@ -164,14 +166,16 @@ constexpr KeyRow kBodyRows[] = {
     plain("mesh", KeyType::Text, "id of the mesh that is its shape"),
     choice("collision", kCollisions, "of a mesh"),
     choice("motion", kMotions, "left out: dynamic"),
-    number("density", kKept, 1000, "kg/m³", "> 0", "of its solid"),
-    number("friction", kKept, 0.5f, "1", ">= 0", "of its surface"),
-    number("restitution", kKept, 0, "1", "[0, 1]", "of its surface"),
-    number("linear_damping", kKept, 0, "1/s", ">= 0", "share of velocity lost"),
-    number("angular_damping", kKept, 0, "1/s", ">= 0", "share of spin lost"),
+    number("density", KILN_AT(SceneBody::Numbers, density), 1000, "kg/m³", "> 0", "of its solid"),
+    number("friction", KILN_AT(SceneBody::Numbers, friction), 0.5f, "1", ">= 0", "of its surface"),
+    number("restitution", KILN_AT(SceneBody::Numbers, restitution), 0, "1", "[0, 1]", "of its surface"),
+    number("linear_damping", KILN_AT(SceneBody::Numbers, linear_damping), 0, "1/s", ">= 0", "share of velocity lost"),
+    number("angular_damping", KILN_AT(SceneBody::Numbers, angular_damping), 0, "1/s", ">= 0", "share of spin lost"),
     plain("continuous", KeyType::Bool, "swept collision, for fast small bodies"),
-    numbers("linear_velocity", 3, kKept, {0, 0, 0}, "m/s", "any", "at the start, of the centre of mass"),
-    numbers("angular_velocity", 3, kKept, {0, 0, 0}, "rad/s", "any", "at the start"),
+    numbers("linear_velocity", 3, KILN_AT(SceneBody::Numbers, linear_velocity), {0, 0, 0}, "m/s", "any",
+            "at the start, of the centre of mass"),
+    numbers("angular_velocity", 3, KILN_AT(SceneBody::Numbers, angular_velocity), {0, 0, 0}, "rad/s", "any",
+            "at the start"),
 };
 constexpr KeyRow kTriggerRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
@@ -229,7 +233,7 @@ constexpr KeyRow kSceneRows[] = {
 }  // namespace
 
 const std::span<const std::string_view> kOpNames = kOps, kLightNames = kLights, kToneMapNames = kToneMaps,
-                                        kBloomKindNames = kBloomKinds, kAxisNames = kAxes;
+                                        kBloomKindNames = kBloomKinds, kAxisNames = kAxes, kMotionNames = kMotions;
 
 const Table kSceneTable{"scene", "A Kiln scene, format 1", kSceneRows};
 const Table kFieldTable{"field", "Resolution and extent of the field", kFieldRows};

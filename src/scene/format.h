@@ -53,7 +53,8 @@ extern const Table kEditTable;  // keys of edits, the node's among them
 extern const Table kNodeTable;  // keys of nodes in objects
 extern const Table kOutlineTable, kMeshTable, kPhysicsTable, kBodyTable, kTriggerTable, kClothTable, kFluidTable;
 
-extern const std::span<const std::string_view> kOpNames, kLightNames, kToneMapNames, kBloomKindNames, kAxisNames;
+extern const std::span<const std::string_view> kOpNames, kLightNames, kToneMapNames, kBloomKindNames, kAxisNames,
+    kMotionNames;
 
 /// Metres beyond which nothing is accepted: squares of larger numbers lose all precision in float.
 inline constexpr float kFarthest = 1e9f;

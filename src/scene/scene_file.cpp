@@ -201,6 +201,9 @@ private:
             std::sort(names.begin(), names.end());
             return names;
         };
+        if (const auto at = section("physics"); at && !in_.table(*at, kPhysicsTable, &scene_.physics.gravity.x))
+            return false;
+        std::unordered_map<std::string_view, std::string_view> owners;  // bodies by edit
         if (const auto at = section("bodies")) {
             for (uint32_t i = 0; i < scene_.edits.size(); ++i) edit_ids.emplace(scene_.edits[i].name, i);
             for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
@@ -208,10 +211,28 @@ private:
                 if (bool(edits) == bool(mesh))
                     return in_.fail(c, "a body has either \"edits\" or a \"mesh\"; give it one of them");
                 if (mesh && !meshes.contains(doc_.text(*mesh))) return in_.unknown_name(*mesh, "mesh", known(meshes));
-                if (!edits) continue;
-                if (doc_.first(*edits) == doc_.next(*edits)) return in_.fail(*edits, "no edits; name at least one");
-                for (JsonIndex e = doc_.first(*edits); e < doc_.next(*edits); e = doc_.next(e))
+                SceneBody body;
+                body.id = doc_.text(*doc_.find(c, "id"));
+                body.place = c;
+                if (!in_.table(c, kBodyTable, &body.numbers.density)) return false;
+                if (const auto m = doc_.find(c, "motion")) {
+                    int motion = 0;
+                    if (!in_.choice(*m, kMotionNames, &motion)) return false;
+                    body.motion = SceneBody::Motion(motion);
+                }
+                if (const auto v = doc_.find(c, "continuous")) body.continuous = doc_.is(*v, JsonType::True);
+                if (edits && doc_.first(*edits) == doc_.next(*edits))
+                    return in_.fail(*edits, "no edits; name at least one");
+                for (JsonIndex e = edits ? doc_.first(*edits) : 0; edits && e < doc_.next(*edits); e = doc_.next(e)) {
                     if (!edit_ids.contains(doc_.text(e))) return in_.unknown_name(e, "edit", known(edit_ids));
+                    if (const auto [owner, fresh] = owners.emplace(doc_.text(e), doc_.text(*doc_.find(c, "id")));
+                        !fresh)
+                        return in_.fail(
+                            e, formatted("the edit \"{}\" is body \"{}\" already; an edit belongs to one body, once",
+                                         doc_.text(e), owner->second));
+                    body.edits.emplace_back(doc_.text(e));
+                }
+                scene_.bodies.push_back(std::move(body));
             }
         }
         if (const auto at = section("triggers")) {

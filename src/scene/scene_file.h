@@ -7,6 +7,7 @@
 
 #include <kiln/world.h>
 
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <string>
@@ -22,6 +23,28 @@ struct TextHash {
     size_t operator()(std::string_view text) const { return std::hash<std::string_view>()(text); }
 };
 using NameNumbers = std::unordered_map<std::string, uint32_t, TextHash, std::equal_to<>>;
+
+/// Section "physics". Friction and restitution are those of the world's surface.
+struct ScenePhysics {
+    vec3 gravity{0, -9.81f, 0};
+    float step = 0.0166666667f;  ///< seconds
+    float friction = 0.5f, restitution = 0;
+};
+
+/// An entry of "bodies".
+struct SceneBody {
+    struct Numbers {
+        float density = 1000, friction = 0.5f, restitution = 0, linear_damping = 0, angular_damping = 0;
+        vec3 linear_velocity{}, angular_velocity{};
+    };
+    enum class Motion : uint8_t { Static, Kinematic, Dynamic };
+    std::string id;
+    std::vector<std::string> edits;  ///< names; empty for the body of a mesh
+    Motion motion = Motion::Dynamic;
+    bool continuous = false;
+    Numbers numbers;
+    JsonIndex place = 0;
+};
 
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
 /// sections that the engine does not act on yet, and how it wrote what has two forms.
@@ -42,6 +65,8 @@ struct SceneData {
     std::vector<Object> objects;                              ///< ObjectId::index refers here
     std::vector<Edit> edits;
     NameNumbers material_numbers, object_numbers;
+    ScenePhysics physics;
+    std::vector<SceneBody> bodies;
 
     // Where things stand in `source`; kNowhere for what was added later.
     static constexpr JsonIndex kNowhere = UINT32_MAX;

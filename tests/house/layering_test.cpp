@@ -71,6 +71,16 @@ TEST(Layering, EveryIncludeFollowsAnArrow) {
               "");
 }
 
+TEST(Layering, EachPhysicsEngineStaysInItsFolder) {
+    for (const char* include :
+         {"#include <Jolt/Jolt.h>", "#include <btBulletDynamicsCommon.h>", "#include <LinearMath/btVector3.h>"})
+        EXPECT_THAT(module_faults(modules(), "src/physics/physics.cpp", include), testing::SizeIs(1)) << include;
+    EXPECT_THAT(module_faults(modules(), "src/physics/jolt/a.cpp", "#include <Jolt/Jolt.h>"), IsEmpty());
+    EXPECT_THAT(module_faults(modules(), "src/physics/bullet/a.cpp", "#include <btBulletDynamicsCommon.h>"), IsEmpty());
+    EXPECT_THAT(module_faults(modules(), "src/physics/jolt/a.cpp", "#include <btBulletDynamicsCommon.h>"),
+                testing::SizeIs(1));
+}
+
 TEST(Layering, EveryModuleFolderHasARowAndEveryRowAFolder) {
     std::vector<std::string> folders;
     for (const auto& entry : fs::directory_iterator(kRoot / "src")) {

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+// SdfField: what bodies, cloth and fluids collide with: distance and gradient at points of some frame. Answers from the exact edits;
+// no mesh, no GPU. Values are lower bounds of the true distance with the right sign (1-Lipschitz), so a cast may advance by them.
+#pragma once
+
+#include "sdf/eval.h"
+#include "sdf/program.h"
+#include "sdf/regions.h"
+
+#include <kiln/math.h>
+
+#include <memory>
+#include <span>
+
+namespace kiln::field {
+
+/// All functions: any thread.
+class SdfField {
+public:
+    virtual ~SdfField() = default;
+    /// Metres, negative inside; at least sdf::kEmptyTest where nothing exists.
+    virtual float distance(vec3 p) const = 0;
+    /// Also the gradient, not normalised; 0 where it vanishes or nothing exists.
+    virtual float distance(vec3 p, vec3& gradient) const = 0;
+    /// The same for many points, near each other: out[i], gradients[i].
+    virtual void distances(std::span<const vec3> points, float* out, vec3* gradients) const;
+    /// out[i] = distance at point i; neighbours of the list should be neighbours in space.
+    virtual void distances(const sdf::Points& points, float* out) const = 0;
+    /// Holds the solid; infinite faces where it has no end there, empty when there is none.
+    virtual Box3 bounds() const = 0;
+};
+
+/// The exact value of a compiled program. A question costs the edits around it (sdf/regions.h).
+class ProgramField final : public SdfField {
+public:
+    explicit ProgramField(std::shared_ptr<const sdf::Program> program);
+
+    float distance(vec3 p) const override;
+    float distance(vec3 p, vec3& gradient) const override;
+    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
+    void distances(const sdf::Points& points, float* out) const override;
+    Box3 bounds() const override { return bounds_; }
+    const sdf::Program& program() const { return *program_; }
+
+private:
+    std::shared_ptr<const sdf::Program> program_;
+    sdf::Regions regions_;
+    Box3 bounds_;
+};
+
+}  // namespace kiln::field

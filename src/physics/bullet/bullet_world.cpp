@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+
+#include "physics/bullet/bullet_world.h"
+
+#include "physics/bullet/sdf_algorithm.h"
+#include "physics/sdf_collision.h"
+
+#include <BulletDynamics/ConstraintSolver/btNNCGConstraintSolver.h>
+#include <btBulletDynamicsCommon.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace kiln::physics {
+
+namespace {
+
+vec3 to_vec(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
+
+// Half a second below this speed, and a body sleeps: as Jolt has it.
+constexpr float kSleepSeconds = 0.5f, kSleepSpeed = 0.03f;
+// Stacks sway at up to 0.06 m/s here (Jolt's at 0.02). What has kept its place for a while sleeps below a higher speed; what starts to
+// slide, however slowly, has left its place by then.
+constexpr float kStillSeconds = 1.5f, kStillPlace = 0.02f, kStillTurn = 0.03f, kStillSpeed = 0.1f;
+
+// A body moves this share of its inner radius in a step before it is swept, if it is continuous.
+constexpr float kSweepShare = 0.5f;
+
+btScalar geometric_mean(const btCollisionObject* a, const btCollisionObject* b) {
+    return std::sqrt(a->getFriction() * b->getFriction());
+}
+btScalar larger(const btCollisionObject* a, const btCollisionObject* b) {
+    return std::max(a->getRestitution(), b->getRestitution());
+}
+
+// Bullet's globals, the same for every world here.
+void set_globals() {
+    gCalculateCombinedFrictionCallback = geometric_mean;
+    gCalculateCombinedRestitutionCallback = larger;
+    gDeactivationTime = kSleepSeconds;
+}
+
+class Configuration final : public btDefaultCollisionConfiguration {
+public:
+    Configuration() : btDefaultCollisionConfiguration(info()) {}
+
+private:
+    static btDefaultCollisionConstructionInfo info() {
+        btDefaultCollisionConstructionInfo out;
+        out.m_customCollisionAlgorithmMaxElementSize = 128;  // of the pool that algorithms come from
+        return out;
+    }
+};
+
+std::unique_ptr<btCollisionShape> make_shape(const Convex& c) {
+    std::unique_ptr<btCollisionShape> out;
+    switch (c.kind) {
+    case Convex::Kind::Sphere:
+        out = std::make_unique<btSphereShape>(c.size.x);
+        break;
+    case Convex::Kind::Box:
+        out = std::make_unique<btBoxShape>(to_bullet(c.size));
+        break;
+    case Convex::Kind::Capsule:
+        out = std::make_unique<btCapsuleShape>(c.size.x, 2 * c.size.y);
+        break;
+    case Convex::Kind::Cylinder:
+        out = std::make_unique<btCylinderShape>(btVector3(c.size.x, c.size.y, c.size.x));
+        break;
+    }
+    // Boxes and cylinders have their margin inside; small ones a small one. Spheres and capsules are their margin.
+    if (c.kind == Convex::Kind::Box || c.kind == Convex::Kind::Cylinder)
+        out->setMargin(std::min(0.04f, 0.1f * inner_radius(c)));
+    return out;
+}
+
+class BulletWorld;
+
+// Bullet's world, which asks ours before it moves the bodies.
+class Dynamics final : public btDiscreteDynamicsWorld {
+public:
+    Dynamics(BulletWorld& owner, btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
+             btConstraintSolver* solver, btCollisionConfiguration* configuration)
+        : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration), owner_(owner) {}
+
+protected:
+    void integrateTransforms(btScalar seconds) override;
+
+private:
+    BulletWorld& owner_;
+};
+
+class BulletWorld final : public World {
+public:
+    explicit BulletWorld(const WorldSettings& settings) {
+        set_globals();
+        dynamics_.setGravity(to_bullet(settings.gravity));
+        dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
+        btContactSolverInfo& solver = dynamics_.getSolverInfo();
+        // One direction of friction lets stacks creep sideways; with two, the plain solver, or fewer
+        // iterations, makes a stack of ten boxes sway more and more.
+        solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
+        solver.m_numIterations = 40;
+        solver.m_restitutionVelocityThreshold = 0.5f;
+    }
+    ~BulletWorld() override {
+        for (auto& o : objects_)
+            if (o) dynamics_.removeRigidBody(o->body.get());
+    }
+
+    std::string_view backend() const override { return "bullet"; }
+
+    void wake(const Box3& box) override {
+        std::vector<uint32_t> found;
+        near(box.inflated(0.1f), found);
+        std::erase_if(found, [&](uint32_t i) { return objects_[i]->body->isStaticObject(); });
+        std::vector<bool> woken(objects_.size());
+        for (const uint32_t i : found) {
+            woken[i] = true;
+            objects_[i]->body->activate(true);
+        }
+        for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
+            btPersistentManifold* manifold = dispatcher_.getManifoldByIndexInternal(m);
+            if (woken[size_t(manifold->getBody0()->getUserIndex())] ||
+                woken[size_t(manifold->getBody1()->getUserIndex())])
+                manifold->clearManifold();
+        }
+    }
+
+protected:
+    void create(uint32_t index, const Body& b) override {
+        if (index >= objects_.size()) objects_.resize(size_t(index) + 1);
+        auto object = std::make_unique<Object>();
+        if (const Convex* convex = std::get_if<Convex>(&b.settings.shape)) {
+            object->convex = *convex;
+            object->shape = make_shape(*convex);
+            object->shape->setUserPointer(&object->convex);
+            object->inner_radius = inner_radius(*convex);
+        } else {
+            const auto& sdf = std::get<std::shared_ptr<const SdfShape>>(b.settings.shape);
+            object->shape = std::make_unique<BulletSdfShape>(sdf, b.body_from_mass);
+            object->inner_radius = float(sdf->inner_radius());
+        }
+        const bool dynamic = b.settings.motion == Motion::Dynamic;
+        const btVector3 inertia{float(b.mass.moments.x), float(b.mass.moments.y), float(b.mass.moments.z)};
+        const btTransform at = to_bullet(b.settings.pose * b.body_from_mass);
+        btRigidBody::btRigidBodyConstructionInfo info(dynamic ? float(b.mass.mass) : 0, nullptr, object->shape.get(),
+                                                      dynamic ? inertia : btVector3(0, 0, 0));
+        info.m_startWorldTransform = at;
+        info.m_friction = b.settings.friction;
+        info.m_restitution = b.settings.restitution;
+        // Bullet multiplies the velocity by (1 - damping)^t.
+        info.m_linearDamping = 1 - std::exp(-b.settings.linear_damping);
+        info.m_angularDamping = 1 - std::exp(-b.settings.angular_damping);
+        object->body = std::make_unique<btRigidBody>(info);
+        object->body->setUserIndex(int(index));
+        object->continuous = dynamic && b.settings.continuous;
+        if (b.settings.motion == Motion::Kinematic) {
+            object->body->setCollisionFlags(object->body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+            object->body->setActivationState(DISABLE_DEACTIVATION);
+        }
+        object->body->setLinearVelocity(to_bullet(b.settings.linear_velocity));
+        object->body->setAngularVelocity(to_bullet(b.settings.angular_velocity));
+        dynamics_.addRigidBody(object->body.get());
+        // Gyroscopic torque as Euler's equations have it, integrated implicitly so that thin bodies stay stable.
+        object->body->setFlags(object->body->getFlags() | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
+        object->anchor = to_pose(at);
+        set_sleep(*object, kSleepSpeed);
+        objects_[index] = std::move(object);
+    }
+
+    void destroy(uint32_t index) override {
+        Object& o = *objects_[index];
+        btVector3 low, high;
+        o.body->getAabb(low, high);
+        dynamics_.removeRigidBody(o.body.get());
+        objects_[index].reset();
+        wake({to_vec(low), to_vec(high)});
+    }
+
+    BodyState get(uint32_t index) const override {
+        const btRigidBody& b = *objects_[index]->body;
+        return {to_pose(b.getWorldTransform()), to_vec(b.getLinearVelocity()), to_vec(b.getAngularVelocity()),
+                !b.isStaticOrKinematicObject() && !b.isActive()};
+    }
+
+    void put(uint32_t index, const Pose& pose) override {
+        btRigidBody& b = *objects_[index]->body;
+        b.setWorldTransform(to_bullet(pose));
+        b.setInterpolationWorldTransform(b.getWorldTransform());
+        if (!b.isStaticObject()) b.activate(true);
+        dynamics_.updateSingleAabb(&b);
+        if (!b.isStaticObject()) return;
+        btVector3 low, high;
+        b.getAabb(low, high);
+        wake({to_vec(low), to_vec(high)});
+    }
+
+    void push(uint32_t index, vec3 linear, vec3 angular) override {
+        btRigidBody& b = *objects_[index]->body;
+        if (b.isStaticObject()) return;
+        b.setLinearVelocity(to_bullet(linear));
+        b.setAngularVelocity(to_bullet(angular));
+        b.activate(true);
+    }
+
+    void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
+        static_cast<BulletSdfShape&>(*objects_[index]->shape).set(std::move(field));
+        dynamics_.updateSingleAabb(objects_[index]->body.get());
+    }
+
+    void advance(float seconds) override {
+        for (auto& o : objects_) {
+            if (!o || !o->body->isKinematicObject()) continue;
+            // Bullet leaves it to us to move these, and asks for their velocities when it solves.
+            btTransform next;
+            btTransformUtil::integrateTransform(o->body->getWorldTransform(), o->body->getLinearVelocity(),
+                                                o->body->getAngularVelocity(), seconds, next);
+            o->body->setWorldTransform(next);
+        }
+        dynamics_.stepSimulation(seconds, 0);
+        for (auto& o : objects_)
+            if (o && o->body->isActive() && !o->body->isStaticOrKinematicObject()) watch(*o, seconds);
+    }
+
+    void collect(std::vector<Pair>& pairs) const override {
+        for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
+            const btPersistentManifold& manifold = *dispatcher_.getManifoldByIndexInternal(m);
+            if (manifold.getNumContacts() == 0) continue;
+            const uint32_t a = uint32_t(manifold.getBody0()->getUserIndex()),
+                           b = uint32_t(manifold.getBody1()->getUserIndex());
+            float depth = -1e30f;
+            for (int i = 0; i < manifold.getNumContacts(); ++i)
+                depth = std::max(depth, -manifold.getContactPoint(i).getDistance());
+            pairs.push_back({std::min(a, b), std::max(a, b), depth});
+        }
+    }
+
+    void near(const Box3& box, std::vector<uint32_t>& out) const override {
+        struct Gather final : btBroadphaseAabbCallback {
+            std::vector<uint32_t>* out = nullptr;
+            bool process(const btBroadphaseProxy* proxy) override {
+                out->push_back(uint32_t(static_cast<btCollisionObject*>(proxy->m_clientObject)->getUserIndex()));
+                return true;
+            }
+        } gather;
+        gather.out = &out;
+        broadphase_.aabbTest(to_bullet(box.min), to_bullet(box.max), gather);
+    }
+
+private:
+    struct Object {
+        Convex convex;
+        std::unique_ptr<btCollisionShape> shape;
+        std::unique_ptr<btRigidBody> body;
+        float inner_radius = 0;
+        bool continuous = false;
+        Pose anchor;  // where it has been for `still` seconds
+        float still = 0;
+    };
+
+    static void set_sleep(Object& o, float speed) {
+        o.body->setSleepingThresholds(speed, speed / std::max(o.inner_radius, 0.05f));
+    }
+    static void watch(Object& o, float seconds) {
+        const Pose now = to_pose(o.body->getWorldTransform());
+        const quat turn = conjugate(o.anchor.rotation) * now.rotation;
+        const bool here = length(now.position - o.anchor.position) < kStillPlace &&
+                          2 * std::hypot(turn.x, turn.y, turn.z) < kStillTurn;
+        const bool was = o.still >= kStillSeconds;
+        o.still = here ? o.still + seconds : 0;
+        if (!here) o.anchor = now;
+        if (was != (o.still >= kStillSeconds)) set_sleep(o, was ? kSleepSpeed : kStillSpeed);
+    }
+
+    friend class Dynamics;
+    // A continuous body that would go far in this step goes only as far as it meets something; its velocity stays, so the contact
+    // that it then has stops it in the next step.
+    struct Held {
+        btRigidBody* body;
+        btVector3 velocity;
+    };
+    std::vector<Held> hold_back(float seconds) {
+        std::vector<Held> held;
+        for (uint32_t i = 0; i < objects_.size(); ++i) {
+            if (!objects_[i] || !objects_[i]->continuous) continue;
+            Object& o = *objects_[i];
+            const vec3 way = to_vec(o.body->getLinearVelocity()) * seconds;
+            if (!o.body->isActive() || !(length(way) > kSweepShare * o.inner_radius)) continue;
+            const Convex* convex = std::get_if<Convex>(&bodies()[i].settings.shape);
+            const Convex swept = convex != nullptr ? *convex : Convex::sphere(o.inner_radius);
+            const auto hit = sweep(swept, to_pose(o.body->getWorldTransform()), way, BodyId{i, bodies()[i].generation});
+            if (!hit) continue;
+            held.push_back({o.body.get(), o.body->getLinearVelocity()});
+            o.body->setLinearVelocity(o.body->getLinearVelocity() * hit->fraction);
+        }
+        return held;
+    }
+
+    Configuration configuration_;
+    mutable btCollisionDispatcher dispatcher_{&configuration_};
+    SdfAlgorithms algorithms_{dispatcher_};
+    mutable btDbvtBroadphase broadphase_;
+    btNNCGConstraintSolver solver_;  // sequential impulses with conjugate gradients: Silcowitz-Hansen et al., 2010
+    Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &solver_, &configuration_};
+    std::vector<std::unique_ptr<Object>> objects_;
+};
+
+void Dynamics::integrateTransforms(btScalar seconds) {
+    const std::vector<BulletWorld::Held> held = owner_.hold_back(seconds);
+    btDiscreteDynamicsWorld::integrateTransforms(seconds);
+    for (const BulletWorld::Held& h : held) h.body->setLinearVelocity(h.velocity);
+}
+
+}  // namespace
+
+std::unique_ptr<World> make_bullet_world(const WorldSettings& settings) {
+    return std::make_unique<BulletWorld>(settings);
+}
+
+}  // namespace kiln::physics

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: MIT
+
+#include "physics/bullet/sdf_algorithm.h"
+
+#include "physics/sdf_collision.h"
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+
+namespace kiln::physics {
+
+namespace {
+
+// Bullet's tree of boxes wants finite ones; a kilometre-sized number of them keeps their area finite in floats.
+constexpr float kWorldSize = 1e5f;
+
+// Bullet keeps four points of a pair between steps, with their impulses. Offered more, it drops others each time, and what rests
+// trembles. So the same four are chosen while nothing moves: the ends of a long triangle, the point farthest across it, and the deepest
+// where it is deeper than those by more than noise.
+void keep_four(std::vector<FieldContact>& contacts) {
+    constexpr float kNoise = 1e-3f;
+    if (contacts.size() <= 4) return;
+    const auto best = [&](auto&& score) {
+        return *std::max_element(contacts.begin(), contacts.end(),
+                                 [&](const FieldContact& a, const FieldContact& b) { return score(a) < score(b); });
+    };
+    FieldContact kept[4];
+    kept[0] = best([](const FieldContact& c) { return c.point.x + 0.37f * c.point.y + 0.61f * c.point.z; });
+    kept[1] = best([&](const FieldContact& c) { return length(c.point - kept[0].point); });
+    const vec3 along = kept[1].point - kept[0].point;
+    kept[2] = best([&](const FieldContact& c) { return length(cross(along, c.point - kept[0].point)); });
+    const vec3 across = cross(along, kept[2].point - kept[0].point);
+    // On the other side of the line.
+    kept[3] = best([&](const FieldContact& c) { return -dot(across, cross(along, c.point - kept[0].point)); });
+    const FieldContact deepest = best([](const FieldContact& c) { return c.depth; });
+    FieldContact* shallow = std::min_element(
+        kept, kept + 4, [](const FieldContact& a, const FieldContact& b) { return a.depth < b.depth; });
+    if (deepest.depth > std::max({kept[0].depth, kept[1].depth, kept[2].depth, kept[3].depth}) + kNoise)
+        *shallow = deepest;
+    contacts.assign(kept, kept + 4);
+}
+
+// One pair of bodies, as long as their boxes meet. The manifold keeps up to four points between steps, with their impulses.
+class SdfAlgorithm : public btCollisionAlgorithm {
+public:
+    SdfAlgorithm(const btCollisionAlgorithmConstructionInfo& info, const btCollisionObjectWrapper* a,
+                 const btCollisionObjectWrapper* b)
+        : btCollisionAlgorithm(info),
+          manifold_(m_dispatcher->getNewManifold(a->getCollisionObject(), b->getCollisionObject())) {}
+    ~SdfAlgorithm() override { m_dispatcher->releaseManifold(manifold_); }
+
+    btScalar calculateTimeOfImpact(btCollisionObject*, btCollisionObject*, const btDispatcherInfo&,
+                                   btManifoldResult*) override {
+        return 1;  // continuous bodies are swept before they move (bullet_world.cpp)
+    }
+    void getAllContactManifolds(btManifoldArray& all) override { all.push_back(manifold_); }
+
+protected:
+    float margin() const { return manifold_->getContactBreakingThreshold(); }
+    // Points of body 0's side, normals out of body 1, in the frame `world_from_field`.
+    void add(btManifoldResult* result, const Pose& world_from_field, bool field_is_first) {
+        keep_four(contacts_);
+        for (const FieldContact& c : contacts_) {
+            // The body's point lies `depth` inside the field: the field's own point is that far back out.
+            const vec3 normal = rotate(world_from_field.rotation, c.normal);
+            const vec3 on_body = world_from_field * c.point;
+            if (field_is_first) {
+                result->addContactPoint(to_bullet(-normal), to_bullet(on_body), -c.depth);
+            } else {
+                result->addContactPoint(to_bullet(normal), to_bullet(on_body + normal * c.depth), -c.depth);
+            }
+        }
+        result->refreshContactPoints();
+    }
+
+    btPersistentManifold* manifold_;
+    std::vector<FieldContact> contacts_;
+};
+
+// kFieldFirst: body 0 is the field.
+template <bool kFieldFirst>
+class ConvexAlgorithm final : public SdfAlgorithm {
+public:
+    using SdfAlgorithm::SdfAlgorithm;
+    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
+                          btManifoldResult* result) override {
+        const btCollisionObjectWrapper *field = kFieldFirst ? a : b, *convex = kFieldFirst ? b : a;
+        const auto& shape = static_cast<const BulletSdfShape&>(*field->getCollisionShape());
+        const Pose world_from_field = to_pose(field->getWorldTransform()) * inverse(shape.field_from_body());
+        collide(shape.sdf().field(), convex_of(convex->getCollisionShape()),
+                inverse(world_from_field) * to_pose(convex->getWorldTransform()), margin(), contacts_);
+        result->setPersistentManifold(manifold_);
+        add(result, world_from_field, kFieldFirst);
+    }
+};
+
+class FieldsAlgorithm final : public SdfAlgorithm {
+public:
+    using SdfAlgorithm::SdfAlgorithm;
+    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
+                          btManifoldResult* result) override {
+        const auto& shape_a = static_cast<const BulletSdfShape&>(*a->getCollisionShape());
+        const auto& shape_b = static_cast<const BulletSdfShape&>(*b->getCollisionShape());
+        const Pose world_from_a = to_pose(a->getWorldTransform()) * inverse(shape_a.field_from_body());
+        const Pose world_from_b = to_pose(b->getWorldTransform()) * inverse(shape_b.field_from_body());
+        collide(shape_a.sdf(), shape_b.sdf(), inverse(world_from_b) * world_from_a, margin(), contacts_);
+        result->setPersistentManifold(manifold_);
+        add(result, world_from_b, false);
+    }
+};
+
+template <typename Algorithm>
+struct Create final : btCollisionAlgorithmCreateFunc {
+    btCollisionAlgorithm* CreateCollisionAlgorithm(btCollisionAlgorithmConstructionInfo& info,
+                                                   const btCollisionObjectWrapper* a,
+                                                   const btCollisionObjectWrapper* b) override {
+        return new (info.m_dispatcher1->allocateCollisionAlgorithm(int(sizeof(Algorithm)))) Algorithm(info, a, b);
+    }
+};
+
+}  // namespace
+
+BulletSdfShape::BulletSdfShape(std::shared_ptr<const SdfShape> shape, const Pose& field_from_body)
+    : sdf_(std::move(shape)), field_from_body_(field_from_body) {
+    m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE;
+    m_collisionMargin = 0;
+}
+
+void BulletSdfShape::getAabb(const btTransform& t, btVector3& low, btVector3& high) const {
+    const Box3& box = sdf_->bounds();
+    if (!box.finite()) {
+        low.setValue(-kWorldSize, -kWorldSize, -kWorldSize);
+        high.setValue(kWorldSize, kWorldSize, kWorldSize);
+        return;
+    }
+    const Pose world = to_pose(t) * inverse(field_from_body_);
+    const vec3 half = box.half_extents(), center = world * box.center();
+    const vec3 x = rotate(world.rotation, {half.x, 0, 0}), y = rotate(world.rotation, {0, half.y, 0}),
+               z = rotate(world.rotation, {0, 0, half.z});
+    const vec3 reach{std::abs(x.x) + std::abs(y.x) + std::abs(z.x), std::abs(x.y) + std::abs(y.y) + std::abs(z.y),
+                     std::abs(x.z) + std::abs(y.z) + std::abs(z.z)};
+    low = to_bullet(center - reach);
+    high = to_bullet(center + reach);
+}
+
+void BulletSdfShape::calculateLocalInertia(btScalar mass, btVector3& inertia) const {
+    const MassProperties& m = sdf_->mass();
+    const double k = m.mass > 0 ? double(mass) / m.mass : 0;
+    inertia.setValue(float(m.moments.x * k), float(m.moments.y * k), float(m.moments.z * k));
+}
+
+SdfAlgorithms::SdfAlgorithms(btCollisionDispatcher& dispatcher)
+    : convex_(new Create<ConvexAlgorithm<false>>),
+      swapped_(new Create<ConvexAlgorithm<true>>),
+      fields_(new Create<FieldsAlgorithm>) {
+    for (const int type :
+         {SPHERE_SHAPE_PROXYTYPE, BOX_SHAPE_PROXYTYPE, CAPSULE_SHAPE_PROXYTYPE, CYLINDER_SHAPE_PROXYTYPE}) {
+        dispatcher.registerCollisionCreateFunc(type, CUSTOM_CONCAVE_SHAPE_TYPE, convex_.get());
+        dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, type, swapped_.get());
+    }
+    dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, CUSTOM_CONCAVE_SHAPE_TYPE, fields_.get());
+}
+SdfAlgorithms::~SdfAlgorithms() = default;
+
+}  // namespace kiln::physics

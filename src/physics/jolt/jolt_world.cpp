@@ -1,0 +1,308 @@
+// SPDX-License-Identifier: MIT
+
+#include "physics/jolt/sdf_shape_jolt.h"
+
+#include "physics/jolt/jolt_world.h"
+
+#include <Jolt/Core/Factory.h>
+#include <Jolt/Core/JobSystemSingleThreaded.h>
+#include <Jolt/Core/JobSystemThreadPool.h>
+#include <Jolt/Core/TempAllocator.h>
+#include <Jolt/Physics/Body/BodyCreationSettings.h>
+#include <Jolt/Physics/Collision/CollisionCollectorImpl.h>
+#include <Jolt/Physics/Collision/ContactListener.h>
+#include <Jolt/Physics/Collision/Shape/BoxShape.h>
+#include <Jolt/Physics/Collision/Shape/CapsuleShape.h>
+#include <Jolt/Physics/Collision/Shape/CylinderShape.h>
+#include <Jolt/Physics/Collision/Shape/SphereShape.h>
+#include <Jolt/Physics/PhysicsSystem.h>
+#include <Jolt/RegisterTypes.h>
+
+#include "base/assert.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+namespace kiln::physics {
+
+namespace {
+
+using namespace JPH;
+
+constexpr uint kMostBodies = World::kMostBodies, kMostPairs = 1 << 16, kMostManifolds = 1 << 16;
+constexpr uint kScratchBytes = 16 << 20;
+
+// Jolt's registries are of the process: made once, never taken down.
+void set_up() {
+    static const bool done = [] {
+        RegisterDefaultAllocator();
+        Factory::sInstance = new Factory();
+        RegisterTypes();
+        JoltSdfShape::register_pairs();
+        return true;
+    }();
+    (void)done;
+}
+
+// Two layers, of what stands and what moves: what stands meets only what moves.
+constexpr ObjectLayer kStands = 0, kMoves = 1;
+class Layers final : public BroadPhaseLayerInterface,
+                     public ObjectVsBroadPhaseLayerFilter,
+                     public ObjectLayerPairFilter {
+public:
+    uint GetNumBroadPhaseLayers() const override { return 2; }
+    BroadPhaseLayer GetBroadPhaseLayer(ObjectLayer layer) const override {
+        return BroadPhaseLayer(BroadPhaseLayer::Type(layer));
+    }
+#if defined(JPH_EXTERNAL_PROFILE) || defined(JPH_PROFILE_ENABLED)
+    const char* GetBroadPhaseLayerName(BroadPhaseLayer) const override { return "layer"; }
+#endif
+    bool ShouldCollide(ObjectLayer a, BroadPhaseLayer b) const override {
+        return a == kMoves || b == BroadPhaseLayer(kMoves);
+    }
+    bool ShouldCollide(ObjectLayer a, ObjectLayer b) const override { return a == kMoves || b == kMoves; }
+};
+
+Ref<JPH::Shape> make_shape(const Convex& c) {
+    const float round = std::min(cDefaultConvexRadius, 0.1f * inner_radius(c));  // of edges
+    switch (c.kind) {
+    case Convex::Kind::Sphere:
+        return new SphereShape(c.size.x);
+    case Convex::Kind::Box:
+        return new BoxShape(to_jolt(c.size), round);
+    case Convex::Kind::Capsule:
+        return new CapsuleShape(c.size.y, c.size.x);
+    case Convex::Kind::Cylinder:
+        return new CylinderShape(c.size.y, c.size.x, round);
+    }
+    return nullptr;
+}
+
+class JoltWorld final : public World, private ContactListener {
+public:
+    explicit JoltWorld(const WorldSettings& settings) : scratch_(kScratchBytes) {
+        if (settings.threads > 1) {
+            jobs_ = std::make_unique<JobSystemThreadPool>(cMaxPhysicsJobs, cMaxPhysicsBarriers, settings.threads - 1);
+        } else {
+            jobs_ = std::make_unique<JobSystemSingleThreaded>(cMaxPhysicsJobs);
+        }
+        system_.Init(kMostBodies, 0, kMostPairs, kMostManifolds, layers_, layers_, layers_);
+        system_.SetGravity(to_jolt(settings.gravity));
+        system_.SetContactListener(this);
+        system_.SetCombineFriction([](const JPH::Body& a, const SubShapeID&, const JPH::Body& b, const SubShapeID&) {
+            return std::sqrt(a.GetFriction() * b.GetFriction());
+        });
+        system_.SetCombineRestitution([](const JPH::Body& a, const SubShapeID&, const JPH::Body& b, const SubShapeID&) {
+            return std::max(a.GetRestitution(), b.GetRestitution());
+        });
+        PhysicsSettings physics;
+        physics.mPenetrationSlop = 0.005f;
+        physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
+        physics.mNumVelocitySteps = 20;             // with 10, a stack of ten boxes sways more and more
+        // What has kept its place, within 3 cm for 1.5 s, sleeps: a swaying stack does, a box that starts down a slope does not.
+        physics.mTimeBeforeSleep = 1.5f;
+        physics.mPointVelocitySleepThreshold = 0.02f;
+        system_.SetPhysicsSettings(physics);
+    }
+    ~JoltWorld() override {
+        for (uint32_t i = 0; i < objects_.size(); ++i)
+            if (objects_[i]) take_out(i);
+    }
+
+    std::string_view backend() const override { return "jolt"; }
+
+    void wake(const Box3& box) override {
+        std::vector<uint32_t> found;
+        near(box.inflated(0.1f), found);
+        for (const uint32_t i : found) {
+            if (bodies()[i].settings.motion == Motion::Static) continue;
+            interface().InvalidateContactCache(objects_[i]->id);
+            interface().ActivateBody(objects_[i]->id);
+        }
+    }
+
+protected:
+    void create(uint32_t index, const Body& b) override {
+        if (index >= objects_.size()) objects_.resize(size_t(index) + 1);
+        auto object = std::make_unique<Object>();
+        if (const Convex* convex = std::get_if<Convex>(&b.settings.shape)) {
+            object->convex = *convex;
+            object->shape = make_shape(*convex);
+            object->shape->SetUserData(reinterpret_cast<uint64>(&object->convex));
+        } else {
+            object->shape = new JoltSdfShape(std::get<std::shared_ptr<const SdfShape>>(b.settings.shape));
+        }
+        const bool fixed = b.settings.motion == Motion::Static, dynamic = b.settings.motion == Motion::Dynamic;
+        BodyCreationSettings settings(object->shape, to_jolt(b.settings.pose.position),
+                                      to_jolt(b.settings.pose.rotation).Normalized(),
+                                      fixed     ? EMotionType::Static
+                                      : dynamic ? EMotionType::Dynamic
+                                                : EMotionType::Kinematic,
+                                      fixed ? kStands : kMoves);
+        settings.mUserData = index;
+        settings.mFriction = b.settings.friction;
+        settings.mRestitution = b.settings.restitution;
+        settings.mLinearDamping = settings.mAngularDamping = 0;
+        settings.mApplyGyroscopicForce = true;
+        settings.mMotionQuality = b.settings.continuous ? EMotionQuality::LinearCast : EMotionQuality::Discrete;
+        settings.mMaxLinearVelocity = 1e4f;
+        settings.mMaxAngularVelocity = 1e3f;
+        settings.mLinearVelocity = to_jolt(b.settings.linear_velocity);
+        settings.mAngularVelocity = to_jolt(b.settings.angular_velocity);
+        if (dynamic) {
+            // In the body's axes: R diag Rᵀ.
+            const Mat44 axes = Mat44::sRotation(to_jolt(b.mass.axes).Normalized());
+            const Vec3 moments(float(b.mass.moments.x), float(b.mass.moments.y), float(b.mass.moments.z));
+            settings.mOverrideMassProperties = EOverrideMassProperties::MassAndInertiaProvided;
+            settings.mMassPropertiesOverride.mMass = float(b.mass.mass);
+            settings.mMassPropertiesOverride.mInertia =
+                axes.Multiply3x3(Mat44::sScale(moments)).Multiply3x3RightTransposed(axes);
+            settings.mMassPropertiesOverride.mInertia.SetColumn4(3, Vec4(0, 0, 0, 1));
+        } else if (!fixed) {
+            settings.mOverrideMassProperties = EOverrideMassProperties::MassAndInertiaProvided;
+            settings.mMassPropertiesOverride.mMass = 1;
+            settings.mMassPropertiesOverride.mInertia = Mat44::sIdentity();
+        }
+        object->id = interface().CreateAndAddBody(settings, fixed ? EActivation::DontActivate : EActivation::Activate);
+        KILN_ASSERT(!object->id.IsInvalid(), "body {} of {}", index, kMostBodies);
+        object->damped = dynamic && (b.settings.linear_damping > 0 || b.settings.angular_damping > 0);
+        objects_[index] = std::move(object);
+        damped_for_ = 0;
+    }
+
+    void destroy(uint32_t index) override {
+        const AABox box = interface().GetTransformedShape(objects_[index]->id).GetWorldSpaceBounds();
+        take_out(index);
+        wake({to_vec(box.mMin), to_vec(box.mMax)});
+    }
+
+    BodyState get(uint32_t index) const override {
+        const BodyInterface& bodies_interface = system_.GetBodyInterfaceNoLock();
+        const BodyID id = objects_[index]->id;
+        BodyState out;
+        RVec3 position;
+        Quat rotation;
+        bodies_interface.GetPositionAndRotation(id, position, rotation);
+        out.pose = Pose{to_vec(position), to_quat(rotation)} * bodies()[index].body_from_mass;
+        Vec3 linear, angular;
+        bodies_interface.GetLinearAndAngularVelocity(id, linear, angular);
+        out.linear_velocity = to_vec(linear);
+        out.angular_velocity = to_vec(angular);
+        out.asleep = bodies()[index].settings.motion == Motion::Dynamic && !bodies_interface.IsActive(id);
+        return out;
+    }
+
+    void put(uint32_t index, const Pose& mass_pose) override {
+        const bool fixed = bodies()[index].settings.motion == Motion::Static;
+        const BodyID id = objects_[index]->id;
+        const AABox before = interface().GetTransformedShape(id).GetWorldSpaceBounds();
+        const Pose pose = mass_pose * inverse(bodies()[index].body_from_mass);
+        interface().SetPositionAndRotation(id, to_jolt(pose.position), to_jolt(pose.rotation).Normalized(),
+                                           fixed ? EActivation::DontActivate : EActivation::Activate);
+        if (!fixed) return;
+        const AABox after = interface().GetTransformedShape(id).GetWorldSpaceBounds();
+        wake({to_vec(before.mMin), to_vec(before.mMax)});
+        wake({to_vec(after.mMin), to_vec(after.mMax)});
+    }
+
+    void push(uint32_t index, vec3 linear, vec3 angular) override {
+        if (bodies()[index].settings.motion == Motion::Static) return;
+        interface().SetLinearAndAngularVelocity(objects_[index]->id, to_jolt(linear), to_jolt(angular));
+        interface().ActivateBody(objects_[index]->id);
+    }
+
+    void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
+        auto& shape = static_cast<JoltSdfShape&>(*objects_[index]->shape);
+        shape.set(std::move(field));
+        interface().NotifyShapeChanged(objects_[index]->id, shape.GetCenterOfMass(), false, EActivation::DontActivate);
+    }
+
+    void advance(float seconds) override {
+        if (seconds != damped_for_) {
+            // Jolt multiplies by 1 - damping · t, for which exp(-damping · t) is meant here.
+            for (uint32_t i = 0; i < objects_.size(); ++i) {
+                if (!objects_[i] || !objects_[i]->damped) continue;
+                const BodyLockWrite lock(system_.GetBodyLockInterfaceNoLock(), objects_[i]->id);
+                MotionProperties& motion = *lock.GetBody().GetMotionProperties();
+                const BodySettings& s = bodies()[i].settings;
+                motion.SetLinearDamping((1 - std::exp(-s.linear_damping * seconds)) / seconds);
+                motion.SetAngularDamping((1 - std::exp(-s.angular_damping * seconds)) / seconds);
+            }
+            damped_for_ = seconds;
+        }
+        std::vector<Pair> before;
+        {
+            const std::lock_guard lock(mutex_);
+            before.swap(touching_);
+        }
+        (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
+        // Sleepers say nothing; they still touch what they touched.
+        const BodyInterface& bodies_interface = system_.GetBodyInterfaceNoLock();
+        const auto rests = [&](uint32_t i) { return objects_[i] && !bodies_interface.IsActive(objects_[i]->id); };
+        const std::lock_guard lock(mutex_);
+        for (const Pair& p : before)
+            if (rests(p.a) && rests(p.b)) touching_.push_back(p);
+    }
+
+    void collect(std::vector<Pair>& pairs) const override {
+        const std::lock_guard lock(mutex_);
+        pairs = touching_;
+    }
+
+    void near(const Box3& box, std::vector<uint32_t>& out) const override {
+        AllHitCollisionCollector<CollideShapeBodyCollector> hits;
+        system_.GetBroadPhaseQuery().CollideAABox({to_jolt(box.min), to_jolt(box.max)}, hits);
+        for (const BodyID id : hits.mHits) out.push_back(uint32_t(system_.GetBodyInterfaceNoLock().GetUserData(id)));
+    }
+
+private:
+    struct Object {
+        Convex convex;
+        Ref<JPH::Shape> shape;
+        BodyID id;
+        bool damped = false;
+    };
+
+    // Between steps nobody else has the bodies.
+    BodyInterface& interface() { return system_.GetBodyInterfaceNoLock(); }
+    void take_out(uint32_t index) {
+        interface().RemoveBody(objects_[index]->id);
+        interface().DestroyBody(objects_[index]->id);
+        objects_[index].reset();
+        const std::lock_guard lock(mutex_);
+        std::erase_if(touching_, [&](const Pair& p) { return p.a == index || p.b == index; });
+    }
+
+    // Called from Jolt's threads while it steps; what they say is sorted by World::step.
+    void note(const JPH::Body& body1, const JPH::Body& body2, const ContactManifold& manifold) {
+        const uint32_t a = uint32_t(body1.GetUserData()), b = uint32_t(body2.GetUserData());
+        const std::lock_guard lock(mutex_);
+        touching_.push_back({std::min(a, b), std::max(a, b), manifold.mPenetrationDepth});
+    }
+    void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings&) override {
+        note(a, b, m);
+    }
+    void OnContactPersisted(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m,
+                            ContactSettings&) override {
+        note(a, b, m);
+    }
+
+    Layers layers_;
+    TempAllocatorImplWithMallocFallback scratch_;
+    std::unique_ptr<JobSystem> jobs_;
+    PhysicsSystem system_;
+    std::vector<std::unique_ptr<Object>> objects_;
+    mutable std::mutex mutex_;  // of touching_
+    std::vector<Pair> touching_;
+    float damped_for_ = 0;  // the step that dampings are set for
+};
+
+}  // namespace
+
+std::unique_ptr<World> make_jolt_world(const WorldSettings& settings) {
+    set_up();
+    return std::make_unique<JoltWorld>(settings);
+}
+
+}  // namespace kiln::physics

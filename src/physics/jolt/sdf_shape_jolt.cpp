@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: MIT
+
+#include "physics/jolt/sdf_shape_jolt.h"
+
+#include "physics/sdf_collision.h"
+
+#include <Jolt/Physics/Collision/CastResult.h>
+#include <Jolt/Physics/Collision/CollidePointResult.h>
+#include <Jolt/Physics/Collision/CollideShape.h>
+#include <Jolt/Physics/Collision/CollideSoftBodyVertexIterator.h>
+#include <Jolt/Physics/Collision/CollisionDispatch.h>
+#include <Jolt/Physics/Collision/PhysicsMaterial.h>
+#include <Jolt/Physics/Collision/RayCast.h>
+#include <Jolt/Physics/Collision/Shape/ConvexShape.h>
+#include <Jolt/Physics/Collision/ShapeCast.h>
+#include <Jolt/Physics/Collision/TransformedShape.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+namespace kiln::physics {
+
+namespace {
+
+using namespace JPH;
+
+constexpr EShapeSubType kType = EShapeSubType::User1;
+constexpr float kWorldSize = 1e5f;  // of what has no end: the tree of boxes wants finite ones
+constexpr uint kNormalBits = 6;     // an axis: three degrees
+
+// Jolt keeps contacts between steps by the numbers of the parts that touch. A field's parts are the directions it faces: two contacts of
+// one pair with one number would be taken for each other. The direction as a point of an octahedron, unfolded
+// (Meyer, Süßmuth, Sußner, Stamminger and Greiner, "On Floating-Point Normal Vectors", 2010).
+uint32 number_of(vec3 n) {
+    const float size = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
+    float u = n.x / size, v = n.z / size;
+    if (n.y < 0) {
+        const float folded = (1 - std::abs(v)) * std::copysign(1.0f, u);
+        v = (1 - std::abs(u)) * std::copysign(1.0f, v);
+        u = folded;
+    }
+    static constexpr float kSteps = float((1 << kNormalBits) - 1);
+    const auto step = [](float w) { return uint32(std::clamp(std::round((w * 0.5f + 0.5f) * kSteps), 0.0f, kSteps)); };
+    return step(u) << kNormalBits | step(v);
+}
+
+const JoltSdfShape& field_of(const JPH::Shape* s) { return *static_cast<const JoltSdfShape*>(s); }
+
+Pose pose_of(Mat44Arg m) { return {to_vec(m.GetTranslation()), to_quat(m.GetQuaternion())}; }
+// Of the field's own frame in the world, given that of its centre of mass.
+Pose world_of(const JoltSdfShape& field, Mat44Arg center_of_mass) {
+    Pose out = pose_of(center_of_mass);
+    out.position = out * -field.center();
+    return out;
+}
+
+// Hits of shape 1 on the field that is shape 2; `world` is the field's frame.
+void add(const std::vector<FieldContact>& contacts, const Pose& world, bool field1, const SubShapeIDCreator& id1,
+         const SubShapeIDCreator& id2, CollideShapeCollector& collector) {
+    for (const FieldContact& c : contacts) {
+        if (collector.ShouldEarlyOut()) return;
+        if (-c.depth >= collector.GetEarlyOutFraction()) continue;
+        const vec3 normal = rotate(world.rotation, c.normal), on1 = world * c.point;
+        const uint32 number = number_of(c.normal);
+        const SubShapeID part1 = field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID();
+        collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
+                                            part1, id2.PushID(number, 2 * kNormalBits).GetID(),
+                                            TransformedShape::sGetBodyID(collector.GetContext())));
+    }
+}
+
+void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
+                    Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+                    const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+    static thread_local std::vector<FieldContact> contacts;
+    const Pose world = world_of(field_of(shape2), transform2);
+    collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1),
+            settings.mMaxSeparationDistance, contacts);
+    add(contacts, world, false, id1, id2, collector);
+}
+
+void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
+                    Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+                    const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+    static thread_local std::vector<FieldContact> contacts;
+    const Pose world1 = world_of(field_of(shape1), transform1), world2 = world_of(field_of(shape2), transform2);
+    collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance,
+            contacts);
+    add(contacts, world2, true, id1, id2, collector);
+}
+
+// Given relative to the centre of mass of shape 2. A field is cast as the largest ball in it.
+void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH::Shape* shape2, Vec3Arg,
+          const ShapeFilter&, Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
+          CastShapeCollector& collector) {
+    const bool field1 = moving.mShape->GetSubType() == kType;
+    const Convex body = field1 ? Convex::sphere(field_of(moving.mShape).GetInnerRadius()) : convex_of(moving.mShape);
+    const JoltSdfShape& field = field_of(shape2);
+    Pose start = pose_of(moving.mCenterOfMassStart);
+    start.position = start.position + field.center();
+    const vec3 way = to_vec(moving.mDirection);
+    const auto hit = sweep(field.sdf().field(), body, start, way, std::min(collector.GetEarlyOutFraction(), 1.0f));
+    if (!hit || hit->fraction >= collector.GetEarlyOutFraction()) return;
+    const bool back_face = dot(hit->normal, way) > 0;
+    if (back_face && settings.mBackFaceModeConvex == EBackFaceMode::IgnoreBackFaces) return;
+    const Vec3 point = transform2 * to_jolt(hit->point - field.center());
+    const uint32 number = number_of(hit->normal);
+    collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)),
+                                     back_face, field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID(),
+                                     id2.PushID(number, 2 * kNormalBits).GetID(),
+                                     TransformedShape::sGetBodyID(collector.GetContext())));
+}
+
+}  // namespace
+
+JoltSdfShape::JoltSdfShape(std::shared_ptr<const SdfShape> sdf)
+    : Shape(EShapeType::User1, kType), sdf_(std::move(sdf)) {}
+
+void JoltSdfShape::register_pairs() {
+    ShapeFunctions& functions = ShapeFunctions::sGet(kType);
+    functions.mConstruct = nullptr;  // never read from a stream
+    functions.mColor = Color::sOrange;
+    for (const EShapeSubType convex : sConvexSubShapeTypes) {
+        CollisionDispatch::sRegisterCollideShape(convex, kType, collide_convex);
+        CollisionDispatch::sRegisterCollideShape(kType, convex, CollisionDispatch::sReversedCollideShape);
+        CollisionDispatch::sRegisterCastShape(convex, kType, cast);
+        CollisionDispatch::sRegisterCastShape(kType, convex, CollisionDispatch::sReversedCastShape);
+    }
+    CollisionDispatch::sRegisterCollideShape(kType, kType, collide_fields);
+    CollisionDispatch::sRegisterCastShape(kType, kType, cast);
+}
+
+AABox JoltSdfShape::GetLocalBounds() const {
+    const Box3& box = sdf_->bounds();
+    if (!box.finite()) return {Vec3::sReplicate(-kWorldSize), Vec3::sReplicate(kWorldSize)};
+    return {to_jolt(box.min - center()), to_jolt(box.max - center())};
+}
+
+uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return 2 * kNormalBits; }
+
+const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
+
+Vec3 JoltSdfShape::GetSurfaceNormal(const SubShapeID&, Vec3Arg local) const {
+    vec3 n;
+    (void)sdf_->field().distance(to_vec(local) + center(), n);
+    return to_jolt(n).NormalizedOr(Vec3::sAxisY());
+}
+
+// Buoyancy is the fluid's own matter.
+void JoltSdfShape::GetSubmergedVolume(Mat44Arg, Vec3Arg, const JPH::Plane&, float& total, float& submerged,
+                                      Vec3& middle JPH_IF_DEBUG_RENDERER(, RVec3Arg)) const {
+    total = GetVolume();
+    submerged = 0;
+    middle = Vec3::sZero();
+}
+
+bool JoltSdfShape::CastRay(const RayCast& ray, const SubShapeIDCreator& id, RayCastResult& hit) const {
+    const auto found =
+        cast_ray(sdf_->field(), to_vec(ray.mOrigin) + center(), to_vec(ray.mDirection), std::min(hit.mFraction, 1.0f));
+    if (!found || found->fraction >= hit.mFraction) return false;
+    hit.mFraction = found->fraction;
+    hit.mSubShapeID2 = id.PushID(number_of(found->normal), 2 * kNormalBits).GetID();
+    return true;
+}
+
+void JoltSdfShape::CastRay(const RayCast& ray, const RayCastSettings&, const SubShapeIDCreator& id,
+                           CastRayCollector& collector, const ShapeFilter& filter) const {
+    if (!filter.ShouldCollide(this, id.GetID())) return;
+    RayCastResult hit;
+    hit.mFraction = collector.GetEarlyOutFraction();
+    if (!CastRay(ray, id, hit)) return;
+    hit.mBodyID = TransformedShape::sGetBodyID(collector.GetContext());
+    collector.AddHit(hit);
+}
+
+void JoltSdfShape::CollidePoint(Vec3Arg point, const SubShapeIDCreator& id, CollidePointCollector& collector,
+                                const ShapeFilter& filter) const {
+    if (filter.ShouldCollide(this, id.GetID()) && sdf_->field().distance(to_vec(point) + center()) <= 0)
+        collector.AddHit({TransformedShape::sGetBodyID(collector.GetContext()), id.GetID()});
+}
+
+void JoltSdfShape::CollideSoftBodyVertices(Mat44Arg transform, Vec3Arg, const CollideSoftBodyVertexIterator& vertices,
+                                           uint count, int shape_index) const {
+    const Mat44 local = transform.InversedRotationTranslation();
+    for (CollideSoftBodyVertexIterator v = vertices, end = vertices + count; v != end; ++v) {
+        if (v.GetInvMass() <= 0) continue;
+        vec3 n;
+        const float d = sdf_->field().distance(to_vec(local * v.GetPosition()) + center(), n);
+        if (!v.UpdatePenetration(-d)) continue;
+        const Vec3 normal = transform.Multiply3x3(to_jolt(n)).NormalizedOr(Vec3::sAxisY());
+        v.SetCollision(JPH::Plane::sFromPointAndNormal(v.GetPosition() - normal * d, normal), shape_index);
+    }
+}
+
+}  // namespace kiln::physics

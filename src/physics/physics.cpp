@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: MIT
+
+#include "physics/physics.h"
+
+#include "physics/bullet/bullet_world.h"
+#include "physics/convex_field.h"
+#include "physics/jolt/jolt_world.h"
+#include "physics/sdf_collision.h"
+
+#include "base/assert.h"
+#include "base/format.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace kiln::physics {
+
+namespace {
+
+bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
+bool finite(const Pose& p) {
+    const quat& q = p.rotation;
+    return finite(p.position) && std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w);
+}
+bool is_field(const BodyShape& s) { return std::holds_alternative<std::shared_ptr<const SdfShape>>(s); }
+const SdfShape& field_of(const BodyShape& s) { return *std::get<std::shared_ptr<const SdfShape>>(s); }
+
+Error refused(const char* what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
+
+std::optional<Error> fault_of(const BodySettings& s) {
+    if (!finite(s.pose)) return refused("a transform that is not finite; write finite numbers");
+    const quat& q = s.pose.rotation;
+    const float size = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
+    if (!(std::abs(size - 1) < 1e-2f)) return refused("a rotation that is not of unit length; normalise it");
+    if (!finite(s.linear_velocity) || !finite(s.angular_velocity))
+        return refused("a velocity that is not finite; write finite numbers");
+    const auto rate = [](float v) { return std::isfinite(v) && v >= 0; };
+    if (!rate(s.friction) || !rate(s.restitution) || !rate(s.linear_damping) || !rate(s.angular_damping))
+        return refused("a friction, restitution or damping that is not a finite number of 0 or more");
+    if (s.motion == Motion::Dynamic && !(std::isfinite(s.density) && s.density > 0))
+        return refused("a density that is not a finite number above 0");
+    if (is_field(s.shape)) {
+        if (s.motion != Motion::Static && !field_of(s.shape).moves())
+            return refused("a field that cannot move: only static bodies may have it");
+    } else {
+        const vec3 size3 = std::get<Convex>(s.shape).size;
+        if (!finite(size3) || !(std::min({size3.x, size3.y, size3.z}) > 0))
+            return refused("no volume: every size must be a finite number above 0");
+    }
+    return std::nullopt;
+}
+
+MassProperties mass_of(const BodySettings& s) {
+    MassProperties out;
+    if (is_field(s.shape)) {
+        out = field_of(s.shape).mass();
+        out.mass *= double(s.density);
+        out.moments = {out.moments.x * double(s.density), out.moments.y * double(s.density),
+                       out.moments.z * double(s.density)};
+        return out;
+    }
+    const Convex& c = std::get<Convex>(s.shape);
+    out.mass = volume(c) * double(s.density);
+    const dvec3 m = moments(c);
+    out.moments = {m.x * out.mass, m.y * out.mass, m.z * out.mass};
+    return out;
+}
+
+Box3 box_around(vec3 center, float radius) { return Box3{center, center}.inflated(radius); }
+
+}  // namespace
+
+Result<BodyId> World::add(const BodySettings& settings) {
+    if (auto fault = fault_of(settings)) return std::move(*fault);
+    if (count_ == kMostBodies)
+        return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
+    uint32_t index = uint32_t(bodies_.size());
+    if (free_.empty()) {
+        bodies_.emplace_back();
+    } else {
+        index = free_.back();
+        free_.pop_back();
+    }
+    Body& body = bodies_[index];
+    body.settings = settings;
+    body.mass = {};
+    body.body_from_mass = {};
+    if (settings.motion != Motion::Static) {
+        body.mass = physics::mass_of(settings);
+        body.body_from_mass = {body.mass.center, body.mass.axes};
+        if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
+    }
+    body.live = true;
+    ++count_;
+    create(index, body);
+    return BodyId{index, body.generation};
+}
+
+const World::Body* World::find(BodyId id) const {
+    if (id.index >= bodies_.size()) return nullptr;
+    const Body& b = bodies_[id.index];
+    return b.live && b.generation == id.generation ? &b : nullptr;
+}
+
+const MassProperties& World::mass_of(BodyId id) const {
+    static const MassProperties none{};
+    const Body* b = find(id);
+    return b != nullptr ? b->mass : none;
+}
+
+void World::remove(BodyId id) {
+    if (find(id) == nullptr) return;
+    destroy(id.index);
+    Body& b = bodies_[id.index];
+    b.live = false;
+    b.settings.shape = Convex{};
+    // What touched it does so no longer: told with the next step's events, under the id it had.
+    ++b.generation;
+    free_.push_back(id.index);
+    --count_;
+}
+
+BodyState World::state(BodyId id) const {
+    const Body* b = find(id);
+    if (b == nullptr) return {};
+    BodyState out = get(id.index);
+    out.pose = out.pose * inverse(b->body_from_mass);
+    return out;
+}
+
+void World::set_pose(BodyId id, const Pose& pose) {
+    if (const Body* b = find(id); b != nullptr && finite(pose)) put(id.index, pose * b->body_from_mass);
+}
+
+void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
+    if (find(id) != nullptr && finite(linear) && finite(angular)) push(id.index, linear, angular);
+}
+
+void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed) {
+    const Body* b = find(id);
+    KILN_ASSERT(b == nullptr || (b->settings.motion == Motion::Static && is_field(b->settings.shape)), "body {}",
+                id.index);
+    if (b == nullptr) return;
+    bodies_[id.index].settings.shape = field;
+    swap(id.index, std::move(field));
+    wake(changed);
+}
+
+void World::step(float seconds) {
+    KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
+    for (uint32_t i = 0; i < bodies_.size(); ++i)
+        if (bodies_[i].live && bodies_[i].settings.motion == Motion::Dynamic) bodies_[i].last = get(i).pose;
+    advance(seconds);
+    for (uint32_t i = 0; i < bodies_.size(); ++i) {
+        if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;
+        const BodyState s = get(i);
+        if (finite(s.pose) && finite(s.linear_velocity) && finite(s.angular_velocity)) continue;
+        put(i, bodies_[i].last);
+        push(i, {}, {});
+        ++lost_;
+    }
+    pairs_.clear();
+    collect(pairs_);
+    std::map<std::pair<BodyId, BodyId>, float> now;
+    for (const Pair& p : pairs_) {
+        auto [at, fresh] = now.try_emplace({id_of(p.a), id_of(p.b)}, p.depth);
+        if (!fresh) at->second = std::max(at->second, p.depth);
+    }
+    events_.clear();
+    std::vector<Touch> touches;
+    touches.reserve(now.size());
+    for (const auto& [key, depth] : now) touches.push_back({key.first, key.second, depth});
+    // Both lists ascend: what is in one only has begun or ended.
+    const auto less = [](const Touch& p, const Touch& q) { return std::pair(p.a, p.b) < std::pair(q.a, q.b); };
+    auto before = touches_.begin();
+    for (const Touch& t : touches) {
+        for (; before != touches_.end() && less(*before, t); ++before) events_.push_back({before->a, before->b, false});
+        if (before != touches_.end() && !less(t, *before)) {
+            ++before;
+        } else {
+            events_.push_back({t.a, t.b, true});
+        }
+    }
+    for (; before != touches_.end(); ++before) events_.push_back({before->a, before->b, false});
+    touches_ = std::move(touches);
+}
+
+// Convex bodies have distances in closed form, so that questions are the same on every engine, and the same as those of fields.
+template <typename Ask>
+auto World::ask(uint32_t index, Ask&& ask_field) const {
+    const BodyShape& shape = bodies_[index].settings.shape;
+    const Pose pose = state(id_of(index)).pose;
+    if (is_field(shape)) return ask_field(field_of(shape).field(), pose);
+    return ask_field(ConvexField(std::get<Convex>(shape)), pose);
+}
+
+template <typename Ask>
+std::optional<BodyHit> World::first_hit(const Box3& box, BodyId but, Ask&& cast) const {
+    std::vector<uint32_t> candidates;
+    near(box, candidates);
+    std::sort(candidates.begin(), candidates.end());  // of two at one place the lower index is hit
+    std::optional<BodyHit> best;
+    for (const uint32_t i : candidates) {
+        if (id_of(i) == but) continue;
+        ask(i, [&](const field::SdfField& field, const Pose& world) {
+            const std::optional<FieldHit> hit = cast(field, inverse(world), best ? best->fraction : 1);
+            if (hit && (!best || hit->fraction < best->fraction))
+                best = BodyHit{id_of(i), hit->fraction, world * hit->point, rotate(world.rotation, hit->normal)};
+        });
+    }
+    return best;
+}
+
+std::optional<BodyHit> World::cast_ray(vec3 origin, vec3 way) const {
+    const vec3 end = origin + way;
+    return first_hit({min(origin, end), max(origin, end)}, {}, [&](const auto& field, const Pose& local, float most) {
+        return physics::cast_ray(field, local * origin, rotate(local.rotation, way), most);
+    });
+}
+
+std::optional<BodyHit> World::sweep(const Convex& shape, const Pose& pose, vec3 way, BodyId but) const {
+    const float radius = outer_radius(shape);
+    const Box3 box = box_union(box_around(pose.position, radius), box_around(pose.position + way, radius));
+    return first_hit(box, but, [&](const auto& field, const Pose& local, float most) {
+        return physics::sweep(field, shape, local * pose, rotate(local.rotation, way), most);
+    });
+}
+
+std::vector<BodyId> World::overlap(const Convex& shape, const Pose& pose) const {
+    std::vector<uint32_t> candidates;
+    near(box_around(pose.position, outer_radius(shape)), candidates);
+    std::sort(candidates.begin(), candidates.end());
+    std::vector<BodyId> out;
+    std::vector<FieldContact> contacts;
+    for (const uint32_t i : candidates) {
+        ask(i, [&](const field::SdfField& field, const Pose& world) {
+            collide(field, shape, inverse(world) * pose, 0, contacts);
+            if (!contacts.empty()) out.push_back(id_of(i));
+        });
+    }
+    return out;
+}
+
+std::span<const Backend> backends() {
+    static const std::vector<Backend> all = [] {
+        std::vector<Backend> out;
+#ifdef KILN_JOLT
+        const Backend jolt{"jolt", jolt_fault(), make_jolt_world};
+        if (jolt.why_not.empty()) out.push_back(jolt);
+#endif
+        out.push_back({"bullet", "", make_bullet_world});
+#ifdef KILN_JOLT
+        if (!jolt.why_not.empty()) out.push_back(jolt);
+#endif
+        return out;
+    }();
+    return all;
+}
+
+Result<std::unique_ptr<World>> make_world(std::string_view name, const WorldSettings& settings) {
+    std::string known;
+    for (const Backend& b : backends()) {
+        if (!b.why_not.empty()) {
+            if (b.name == name) return Error{formatted("physics engine {}: {}", name, b.why_not), ErrorKind::Usage};
+            continue;
+        }
+        if (name.empty() || b.name == name) return b.make(settings);
+        known += (known.empty() ? "" : ", ") + std::string(b.name);
+    }
+    return Error{formatted("there is no physics engine \"{}\"; there is {}", name, known), ErrorKind::Usage};
+}
+
+}  // namespace kiln::physics

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT
+// SdfShape: a field as the shape of a body. Bodies that move also have points of its surface, and mass properties integrated from it.
+#pragma once
+
+#include "field/sdf_field.h"
+
+#include <kiln/result.h>
+
+#include <memory>
+#include <vector>
+
+namespace kiln::physics {
+
+/// In the body's frame. `moments` are about the centre along the axes of `axes` (body = axes · principal).
+struct MassProperties {
+    double mass = 0;  ///< kg
+    vec3 center{};
+    quat axes{};
+    dvec3 moments{};
+};
+/// From the symmetric inertia tensor about the centre: xx, yy, zz, xy, xz, yz.
+MassProperties principal(double mass, vec3 center, const double (&inertia)[6]);
+
+class SdfShape {
+public:
+    /// Of a world that never moves.
+    static std::shared_ptr<const SdfShape> fixed(std::shared_ptr<const field::SdfField> field);
+    /// Of a body. Fails when the solid has no volume, or no end. Integrates and samples: milliseconds.
+    static Result<std::shared_ptr<const SdfShape>> moving(std::shared_ptr<const field::SdfField> field);
+
+    const field::SdfField& field() const { return *field_; }
+    Box3 bounds() const { return bounds_; }
+    bool moves() const { return !groups_.empty(); }
+    /// For a density of 1 kg/m³.
+    const MassProperties& mass() const { return mass_; }
+    double inner_radius() const { return inner_radius_; }
+    /// Mean distance of neighbouring surface points, metres.
+    float spacing() const { return spacing_; }
+
+    /// A run of neighbouring surface points, and a ball around them.
+    struct Group {
+        int first = 0, count = 0;
+        vec3 center{};
+        float radius = 0;
+    };
+    const std::vector<Group>& groups() const { return groups_; }
+    /// On the surface to within a thousandth of the spacing.
+    vec3 point(int i) const { return {x_[size_t(i)], y_[size_t(i)], z_[size_t(i)]}; }
+    int point_count() const { return int(x_.size()); }
+
+private:
+    SdfShape() = default;
+    void sample_surface();
+    std::shared_ptr<const field::SdfField> field_;
+    Box3 bounds_;
+    MassProperties mass_;
+    double inner_radius_ = 0;
+    float spacing_ = 0;
+    std::vector<float> x_, y_, z_;
+    std::vector<Group> groups_;
+};
+
+}  // namespace kiln::physics

@@ -1,0 +1,182 @@
+// SPDX-License-Identifier: MIT
+// Scenes with bodies, run: what the JSON says, for every engine that runs here.
+#include <kiln/world.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+#include <string>
+
+using namespace kiln;
+using nlohmann::json;
+using testing::HasSubstr;
+
+namespace {
+
+std::vector<std::string> engines() {
+    std::vector<std::string> out;
+    for (const PhysicsBackend& b : physics_backends())
+        if (b.why_not.empty()) out.emplace_back(b.name);
+    return out;
+}
+
+World parsed(const std::string& text) {
+    auto world = World::parse(text, "s.kiln.json");
+    EXPECT_TRUE(world) << (world ? "" : world.error().message);
+    return world ? std::move(*world) : World();
+}
+
+json run(const World& world, const SimulateSettings& settings) {
+    const auto text = world.simulate_json(settings);
+    EXPECT_TRUE(text) << (text ? "" : text.error().message);
+    return text ? json::parse(*text) : json();
+}
+
+std::string message(const std::string& text, const SimulateSettings& settings = {}) {
+    auto world = World::parse(text, "s.kiln.json");
+    if (!world) return world.error().message;
+    const auto out = world->simulate_json(settings);
+    return out ? "no error" : out.error().message;
+}
+
+const json& body(const json& frame, const std::string& id) {
+    for (const json& b : frame["bodies"])
+        if (b["id"] == id) return b;
+    static const json none;
+    ADD_FAILURE() << "no body " << id;
+    return none;
+}
+
+constexpr const char* kTumble = R"({"format": 1,
+  "edits": [
+    {"id": "ground", "shape": "plane"},
+    {"id": "lump", "shape": "sphere", "radius": 1, "position": [0, -0.2, 0], "blend_radius": 0.3},
+    {"id": "ball", "shape": "sphere", "radius": 0.2, "scale": 2, "position": [4, 0.4, 0]},
+    {"id": "crate", "shape": "box", "half_extents": [0.3, 0.3, 0.3], "position": [-0.2, 2, 0.1], "rotation": [0, 0, 0.1305262, 0.9914449]},
+    {"id": "ring", "shape": "torus", "major_radius": 0.6, "minor_radius": 0.15, "position": [-4, 0.2, 0]},
+    {"id": "cut", "shape": "box", "half_extents": [0.2, 0.5, 0.2], "position": [-3.4, 0.2, 0], "op": "subtract"}],
+  "bodies": [
+    {"id": "b1", "edits": ["ball"], "density": 500},
+    {"id": "b2", "edits": ["crate"]},
+    {"id": "b3", "edits": ["ring", "cut"], "friction": 0.9}]})";
+
+TEST(Simulate, SaysWhatTheContractNames) {
+    const World world = parsed(kTumble);
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 1, .every = 0.25, .backend = engine});
+        EXPECT_EQ(out["backend"], engine);
+        ASSERT_EQ(out["bodies"].size(), 3u);
+        EXPECT_EQ(out["bodies"][0]["id"], "b1");
+        EXPECT_NEAR(out["bodies"][0]["mass"].get<double>(), 500 * 4 / 3.0 * 3.14159265 * 0.064, 0.01);
+        EXPECT_NEAR(out["bodies"][1]["mass"].get<double>(), 216, 0.01);
+        EXPECT_LT(out["bodies"][2]["center_of_mass"][0].get<double>(), -0.05);
+        ASSERT_EQ(out["frames"].size(), 5u);
+        for (size_t i = 0; i < 5; ++i) {
+            EXPECT_NEAR(out["frames"][i]["time"].get<double>(), 0.25 * double(i), 1e-5);
+            for (const json& b : out["frames"][i]["bodies"])
+                for (const char* key : {"id", "position", "rotation", "linear_velocity", "angular_velocity", "asleep"})
+                    EXPECT_TRUE(b.contains(key)) << key;
+        }
+        // At the start a body's frame is its first edit's.
+        EXPECT_EQ(body(out["frames"][0], "b2")["position"], json::parse("[-0.2, 2.0, 0.1]"));
+        EXPECT_EQ(body(out["frames"][0], "b3")["position"], json::parse("[-4.0, 0.2, 0.0]"));
+        ASSERT_FALSE(out["events"].empty());
+        for (const json& e : out["events"]) EXPECT_TRUE(e["type"] == "begin" || e["type"] == "end");
+    }
+}
+
+TEST(Simulate, ThreadsDoNotChangeAByte) {
+    const World world = parsed(kTumble);
+    for (const std::string& engine : engines()) {
+        const auto one = world.simulate_json({.seconds = 3, .backend = engine, .threads = 1});
+        const auto two = world.simulate_json({.seconds = 3, .backend = engine, .threads = 2});
+        const auto again = world.simulate_json({.seconds = 3, .backend = engine, .threads = 1});
+        ASSERT_TRUE(one && two && again);
+        EXPECT_EQ(*one, *two) << engine;
+        EXPECT_EQ(*one, *again) << engine;
+    }
+}
+
+TEST(Simulate, EditsOfBodiesLeaveTheWorld) {
+    // Where each lies in the world's list it would be pushed out of itself.
+    const World world = parsed(kTumble);
+    for (const std::string& engine : engines()) {
+        for (const bool as_fields : {false, true}) {
+            const json out = run(world, {.seconds = 4, .every = 4, .backend = engine, .field_bodies = as_fields});
+            const json& ball = body(out["frames"].back(), "b1");
+            EXPECT_NEAR(ball["position"][1].get<double>(), 0.4, 0.01) << engine << as_fields;
+            EXPECT_NEAR(ball["position"][0].get<double>(), 4, 0.02) << engine << as_fields;
+            const json& ring = body(out["frames"].back(), "b3");
+            EXPECT_NEAR(ring["position"][1].get<double>(), 0.15, 0.02) << engine << as_fields;
+            EXPECT_NEAR(ring["position"][0].get<double>(), -4, 0.05) << engine << as_fields;
+        }
+    }
+}
+
+TEST(Simulate, AFallIsTheFormulas) {
+    const World world = parsed(R"({"format": 1, "physics": {"gravity": [0, -3.7, 0.5], "step": 0.01},
+      "edits": [{"id": "e", "shape": "ellipsoid", "radii": [0.2, 0.3, 0.4], "position": [1, 100, 2]}],
+      "bodies": [{"id": "b", "edits": ["e"], "linear_velocity": [2, 1, 0], "angular_velocity": [0, 0, 0]}]})");
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 2, .every = 2, .backend = engine});
+        ASSERT_EQ(out["frames"].size(), 2u);
+        const json& b = body(out["frames"][1], "b");
+        EXPECT_NEAR(b["linear_velocity"][1].get<double>(), 1 - 3.7 * 2, 1e-3) << engine;
+        // Symplectic Euler: half a step more than the parabola.
+        EXPECT_NEAR(b["position"][0].get<double>(), 1 + 2 * 2, 2e-3) << engine;
+        EXPECT_NEAR(b["position"][1].get<double>(), 100 + 2 - 0.5 * 3.7 * 2 * 2.01, 5e-3) << engine;
+        EXPECT_NEAR(b["position"][2].get<double>(), 2 + 0.5 * 0.5 * 2 * 2.01, 2e-3) << engine;
+        EXPECT_FALSE(b["asleep"].get<bool>());
+    }
+}
+
+TEST(Simulate, MotionAndSurfaceAreRead) {
+    const World world = parsed(R"({"format": 1, "physics": {"restitution": 0.8},
+      "edits": [{"id": "ground", "shape": "plane"},
+                {"id": "a", "shape": "sphere", "radius": 0.5, "position": [0, 3, 0]},
+                {"id": "b", "shape": "sphere", "radius": 0.5, "position": [5, 3, 0]},
+                {"id": "c", "shape": "box", "position": [-5, 3, 0]}],
+      "bodies": [{"id": "bouncer", "edits": ["a"]},
+                 {"id": "hanging", "edits": ["b"], "motion": "static"},
+                 {"id": "gliding", "edits": ["c"], "motion": "kinematic", "linear_velocity": [1, 0, 0]}]})");
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 1.4, .backend = engine});
+        double highest = 0;
+        bool touched = false;
+        for (const json& f : out["frames"]) {
+            const double y = body(f, "bouncer")["position"][1].get<double>();
+            touched = touched || y < 0.6;
+            if (touched) highest = std::max(highest, y);
+        }
+        // 2.5 m down, 0.8² of it up again.
+        EXPECT_NEAR(highest - 0.5, 2.5 * 0.64, 0.15) << engine;
+        EXPECT_EQ(body(out["frames"].back(), "hanging")["position"][1], 3.0);
+        EXPECT_NEAR(body(out["frames"].back(), "gliding")["position"][0].get<double>(), -5 + 1.4, 0.01) << engine;
+        EXPECT_EQ(out["bodies"][1]["mass"], 0.0);
+    }
+}
+
+TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
+    const std::string hollow = R"({"format": 1,
+ "edits": [{"id": "a", "shape": "sphere", "radius": 0.2}, {"id": "b", "shape": "sphere", "radius": 0.3, "op": "subtract"}],
+ "bodies": [{"id": "x", "edits": ["a", "b"]}]})";
+    EXPECT_THAT(message(hollow),
+                testing::AllOf(HasSubstr("s.kiln.json:3:"), HasSubstr("bodies[0]"), HasSubstr("no volume")));
+    EXPECT_THAT(
+        message(R"({"format": 1, "edits": [{"id": "a", "shape": "plane"}], "bodies": [{"id": "x", "edits": ["a"]}]})"),
+        HasSubstr("without end"));
+    EXPECT_THAT(message(R"({"format": 1, "edits": [{"id": "a", "shape": "sphere"}],
+      "bodies": [{"id": "x", "edits": ["a"]}, {"id": "y", "edits": ["a"]}]})"),
+                testing::AllOf(HasSubstr("bodies[1].edits[0]"), HasSubstr("body \"x\" already")));
+    EXPECT_THAT(
+        message(R"({"format": 1, "meshes": [{"id": "m", "file": "m.glb"}], "bodies": [{"id": "x", "mesh": "m"}]})"),
+        HasSubstr("bodies of meshes"));
+    EXPECT_THAT(message(kTumble, {.backend = "no such"}), testing::AllOf(HasSubstr("no such"), HasSubstr("bullet")));
+    EXPECT_THAT(message(kTumble, {.seconds = NAN}), HasSubstr("finite"));
+    EXPECT_THAT(message(kTumble, {.seconds = -1}), HasSubstr("0 or more"));
+    EXPECT_THAT(message(kTumble, {.every = -1}), HasSubstr("0 or more"));
+}
+
+}  // namespace
