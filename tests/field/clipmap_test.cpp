@@ -52,8 +52,8 @@ Clipmap made(std::shared_ptr<const sdf::Program> program, dvec3 focus, ClipmapOp
 constexpr ClipmapOptions kSmall{.voxel_size = 0.05f, .levels = 4, .cells = 32};
 
 uint64_t hash_of(const BrickContent& brick) {
-    uint64_t sum = brick.half ? hash64_of(std::span<const uint16_t>(*brick.half))
-                              : hash64_of(std::span<const uint8_t>(*brick.bytes));
+    uint64_t sum = brick.half ? hash64_of(std::span<const uint16_t>(brick.half->codes))
+                              : hash64_of(std::span<const uint8_t>(brick.bytes->codes));
     sum = hash_combine(sum, brick.material);
     if (!brick.materials) return sum;
     sum = hash_combine(sum, hash64_of(std::span<const uint16_t>(brick.materials->words)));
