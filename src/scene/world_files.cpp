@@ -105,7 +105,7 @@ Result<World> World::load(const std::string& path_or_name, int workers) {
             m.report->dropped_bytes = 0;
             m.report->reason.clear();
         }
-        if (!foreign && m.report->commands == 0 && m.report->dropped_bytes == 0) m.report.reset();
+        if (!m.report->foreign && m.report->commands == 0 && m.report->dropped_bytes == 0) m.report.reset();
         return world;
     }
 }
@@ -253,7 +253,9 @@ Result<void> World::Impl::read_journaled(World& world, std::string text, const s
     const scene::JournalStart start = scene::find_start(records, hash_of(text));
     if (auto done = read(world, std::move(text), scene); !done) return done;
     report.emplace().file = scene::journal_path(scene);
-    report->foreign = start.foreign && !bytes.empty() && records.has_header;
+    // One without a record has nothing to lose, whatever it continues.
+    const bool holds_nothing = records.has_header && records.payloads.empty() && records.fault.empty();
+    report->foreign = start.foreign && records.has_header && !holds_nothing;
     report->reason = records.fault;
     if (start.foreign) {
         records = {};
@@ -264,7 +266,7 @@ Result<void> World::Impl::read_journaled(World& world, std::string text, const s
             records = read_records(bytes.substr(0, end));
         }
     }
-    report->dropped_bytes = bytes.size() - records.good_bytes;
+    report->dropped_bytes = holds_nothing ? 0 : bytes.size() - records.good_bytes;
     if (report->foreign) report->reason = "it continues another scene, or another version of this one";
     return get_ready(world);
 }
@@ -286,7 +288,7 @@ Result<World> World::open(const std::string& path, int workers) {
     m.keep_log(world);
     JournalReport& report = *m.report;
     const std::string_view dropped = std::string_view(bytes).substr(records.good_bytes);
-    if (!dropped.empty()) {
+    if (report.dropped_bytes > 0) {
         report.kept_in = side_file(report.file);
         auto kept = AtomicFile::create(report.kept_in);
         if (!kept) return kept.error();

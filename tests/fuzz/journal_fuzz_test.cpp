@@ -47,7 +47,8 @@ TEST(JournalFuzz, EveryTruncationAndFlippedBit) {
 // With checksums made right again, so that the commands themselves are fed.
 TEST(JournalFuzz, PayloadsThrownAbout) {
     std::mt19937 random(5);
-    const Records good = read_records(seeds().front());
+    const std::string seed = seeds().front();  // the records look into it
+    const Records good = read_records(seed);
     const char* const tokens[] = {"{",    "}",  "[",    "]",       ",",      ":",          "\"",
                                   "null", "-1", "1e38", "\"add\"", "\"id\"", "\"before\"", "{}"};
     for (int round = 0; round < 2000; ++round) {

@@ -68,6 +68,17 @@ TEST(Bench, EveryRowOfEveryKindEqualsTheSlowWay) {
     }
 }
 
+TEST(Bench, WhatTheJournalRowsDidReadsBackAsItWas) {
+    const std::vector<std::string> journal{"journal"};
+    const auto report = run_bench(journal, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_EQ(report->rows.size(), 3u);
+    for (const BenchRow& row : report->rows) {
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_EQ(row.checksum.size(), 16u) << row.name;
+    }
+}
+
 TEST(Bench, AChecksumFollowsTheSceneAndNothingElse) {
     const std::vector<std::string> bake{"field/bake"};
     const auto checksum = [&](const BenchOptions& o) { return run_bench(bake, o)->rows.at(0).checksum; };

@@ -318,6 +318,14 @@ TEST_F(Journals, AForeignJournalIsPutAside) {
     EXPECT_EQ(bytes_of(folder_ / "s.kiln.json.journal.dropped"), journal);
     ASSERT_TRUE(world.add(ball("d", 1)));
     EXPECT_EQ(loaded(), world.to_json());
+    // One without records is nobody's loss.
+    ASSERT_TRUE(world.save(scene_));
+    const std::string empty = bytes_of(journal_);
+    world = World();
+    be(other, empty);
+    EXPECT_FALSE(World::load(scene_)->journal_report());
+    world = open();
+    EXPECT_FALSE(fs::exists(folder_ / "s.kiln.json.journal.dropped-2"));
 }
 
 TEST_F(Journals, OneProgramEditsASceneWhileOthersRead) {
