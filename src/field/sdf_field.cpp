@@ -107,6 +107,13 @@ void ProgramField::distances(std::span<const vec3> points, float* out, vec3* gra
     }
 }
 
+uint32_t ProgramField::material(vec3 p) const {
+    sdf::Regions::Cursor cursor = nullptr;
+    sdf::MaterialMix mix;
+    (void)sdf::evaluate(regions_.tape(to_double(p), cursor), to_double(p), &mix);
+    return mix.id0 == uint16_t(sdf::kNoMaterial) ? sdf::kDefaultMaterial : mix.id0;
+}
+
 void ProgramField::distances(const sdf::Points& points, float* out) const {
     // Runs of neighbours that lie in one region share its short tape.
     sdf::Regions::Cursor cursor = nullptr;

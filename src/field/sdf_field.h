@@ -26,6 +26,8 @@ public:
     virtual void distances(std::span<const vec3> points, float* out, vec3* gradients) const;
     /// out[i] = distance at point i; neighbours of the list should be neighbours in space.
     virtual void distances(const sdf::Points& points, float* out) const = 0;
+    /// Number of the heaviest material (sdf::material_number); of a surface where none is said, sdf::kDefaultMaterial.
+    virtual uint32_t material(vec3) const { return sdf::kDefaultMaterial; }
     /// Holds the solid; infinite faces where it has no end there, empty when there is none.
     virtual Box3 bounds() const = 0;
 };
@@ -39,6 +41,7 @@ public:
     float distance(vec3 p, vec3& gradient) const override;
     void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
     void distances(const sdf::Points& points, float* out) const override;
+    uint32_t material(vec3 p) const override;
     Box3 bounds() const override { return bounds_; }
     const sdf::Program& program() const { return *program_; }
 

@@ -130,11 +130,26 @@ BodyState World::state(BodyId id) const {
 }
 
 void World::set_pose(BodyId id, const Pose& pose) {
-    if (const Body* b = find(id); b != nullptr && finite(pose)) put(id.index, pose * b->body_from_mass);
+    if (find(id) == nullptr || !finite(pose)) return;
+    bodies_[id.index].settings.pose = pose;
+    put(id.index, pose * bodies_[id.index].body_from_mass);
 }
 
 void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
     if (find(id) != nullptr && finite(linear) && finite(angular)) push(id.index, linear, angular);
+}
+
+Surface World::surface(uint32_t index, vec3 p_world) const {
+    const BodySettings& s = bodies_[index].settings;
+    const Surface whole{s.friction, s.restitution};
+    if (s.surfaces.empty() || !is_field(s.shape)) return whole;
+    const Pose pose = s.motion == Motion::Static ? s.pose : get(index).pose * inverse(bodies_[index].body_from_mass);
+    const uint32_t number = field_of(s.shape).field().material(inverse(pose) * p_world);
+    return number < s.surfaces.size() ? s.surfaces[number] : whole;
+}
+
+Surface World::of_pair(const Surface& a, const Surface& b) {
+    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
 }
 
 void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed) {

@@ -30,12 +30,17 @@ enum class Motion : uint8_t { Static, Kinematic, Dynamic };
 /// Exact convex shapes, or a field.
 using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>>;
 
+struct Surface {
+    float friction = 0.5f, restitution = 0;
+};
+
 struct BodySettings {
     BodyShape shape = Convex{};
     Motion motion = Motion::Dynamic;
     Pose pose{};
     float density = 1000;  ///< kg/m³
     float friction = 0.5f, restitution = 0;
+    std::vector<Surface> surfaces{};  ///< of a field, by the number of its material; empty: the two above everywhere
     float linear_damping = 0, angular_damping = 0;  ///< 1/s
     bool continuous = false;  ///< swept, so that it does not pass through what is thinner than its way in a step
     vec3 linear_velocity{}, angular_velocity{};
@@ -123,6 +128,9 @@ protected:
         bool live = false;
     };
     const Body* find(BodyId id) const;
+    /// At a point of the world. May be called while the engine steps.
+    Surface surface(uint32_t index, vec3 p_world) const;
+    static Surface of_pair(const Surface& a, const Surface& b);
     const std::vector<Body>& bodies() const { return bodies_; }
 
     // What an engine does. Frames are those of the mass (body_from_mass).

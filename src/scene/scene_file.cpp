@@ -95,6 +95,7 @@ private:
             Material m;
             if (!in_.table(c, kMaterialTable, &m.base_color.x)) return false;
             scene_.materials.emplace_back(doc_.key(c), m);
+            scene_.silent.push_back({!doc_.find(c, "friction"), !doc_.find(c, "restitution")});
         }
         if (scene_.materials.size() > 60000)
             return in_.fail(*at, formatted("{} materials; at most 60000", scene_.materials.size()));

@@ -62,7 +62,12 @@ struct SceneData {
     std::string description;
     Stage stage;
     std::vector<std::pair<std::string, Material>> materials;  ///< MaterialId::index refers here
-    std::vector<Object> objects;                              ///< ObjectId::index refers here
+    /// By material: what its file says nothing of, so that the scene's own counts. Those added later say everything.
+    struct Silent {
+        bool friction = false, restitution = false;
+    };
+    std::vector<Silent> silent;
+    std::vector<Object> objects;  ///< ObjectId::index refers here
     std::vector<Edit> edits;
     NameNumbers material_numbers, object_numbers;
     ScenePhysics physics;

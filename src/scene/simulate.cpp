@@ -143,10 +143,21 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
         auto field = compiled(ground);
         if (!field) return field.error();
         if (!(*field)->bounds().empty()) {
+            // The scene's own where no material says.
+            std::vector<physics::Surface> surfaces{{data.physics.friction, data.physics.restitution}};
+            for (size_t i = 0; i < data.materials.size(); ++i) {
+                const scene::SceneData::Silent silent =
+                    i < data.silent.size() ? data.silent[i] : scene::SceneData::Silent{};
+                const Material& m = data.materials[i].second;
+                surfaces.push_back({silent.friction ? data.physics.friction : m.friction,
+                                    silent.restitution ? data.physics.restitution : m.restitution});
+            }
+            if (surfaces.size() == 1) surfaces.clear();
             auto added = add({.shape = physics::SdfShape::fixed(std::move(*field)),
                               .motion = physics::Motion::Static,
                               .friction = data.physics.friction,
-                              .restitution = data.physics.restitution},
+                              .restitution = data.physics.restitution,
+                              .surfaces = std::move(surfaces)},
                              kWorldName);
             if (!added) return added.error();
             ran.clear();

@@ -158,6 +158,26 @@ TEST(Simulate, MotionAndSurfaceAreRead) {
     }
 }
 
+TEST(Simulate, TheGroundsMaterialsSayHowTheyRub) {
+    // Three strips of a slope of 20 degrees: ice, rubber, and one whose material says nothing of friction.
+    const World world = parsed(R"({"format": 1, "physics": {"friction": 0.9, "gravity": [3.3552, -9.2184, 0]},
+      "materials": {"ice": {"friction": 0}, "rubber": {"friction": 1.5}, "paint": {"base_color": [1, 0, 0]}},
+      "edits": [{"id": "i", "shape": "box", "half_extents": [50, 1, 1], "position": [0, -1, -3], "material": "ice"},
+                {"id": "r", "shape": "box", "half_extents": [50, 1, 1], "position": [0, -1, 0], "material": "rubber"},
+                {"id": "p", "shape": "box", "half_extents": [50, 1, 1], "position": [0, -1, 3], "material": "paint"},
+                {"id": "a", "shape": "box", "half_extents": [0.3, 0.1, 0.3], "position": [0, 0.1, -3]},
+                {"id": "b", "shape": "box", "half_extents": [0.3, 0.1, 0.3], "position": [0, 0.1, 0]},
+                {"id": "c", "shape": "box", "half_extents": [0.3, 0.1, 0.3], "position": [0, 0.1, 3]}],
+      "bodies": [{"id": "on_ice", "edits": ["a"]}, {"id": "on_rubber", "edits": ["b"]},
+                 {"id": "on_paint", "edits": ["c"], "friction": 0.2}]})");
+    for (const std::string& engine : engines()) {
+        const json end = run(world, {.seconds = 1, .every = 1, .backend = engine})["frames"].back();
+        EXPECT_NEAR(body(end, "on_ice")["linear_velocity"][0].get<double>(), 3.3552, 0.02) << engine;
+        EXPECT_NEAR(body(end, "on_rubber")["position"][0].get<double>(), 0, 0.01) << engine;
+        EXPECT_NEAR(body(end, "on_paint")["position"][0].get<double>(), 0, 0.01) << engine;
+    }
+}
+
 TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
     const std::string hollow = R"({"format": 1,
  "edits": [{"id": "a", "shape": "sphere", "radius": 0.2}, {"id": "b", "shape": "sphere", "radius": 0.3, "op": "subtract"}],

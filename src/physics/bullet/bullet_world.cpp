@@ -33,11 +33,15 @@ btScalar larger(const btCollisionObject* a, const btCollisionObject* b) {
     return std::max(a->getRestitution(), b->getRestitution());
 }
 
+bool contact_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int, int,
+                   const btCollisionObjectWrapper* b, int, int);
+
 // Bullet's globals, the same for every world here.
 void set_globals() {
     gCalculateCombinedFrictionCallback = geometric_mean;
     gCalculateCombinedRestitutionCallback = larger;
     gDeactivationTime = kSleepSeconds;
+    gContactAddedCallback = contact_added;
 }
 
 class Configuration final : public btDefaultCollisionConfiguration {
@@ -110,6 +114,14 @@ public:
 
     std::string_view backend() const override { return "bullet"; }
 
+    // Of a contact with a body that is not the same all over.
+    void give_surface(btManifoldPoint& point, const btCollisionObject& a, const btCollisionObject& b) const {
+        const Surface s = of_pair(surface(uint32_t(a.getUserIndex()), to_vec(point.getPositionWorldOnA())),
+                                  surface(uint32_t(b.getUserIndex()), to_vec(point.getPositionWorldOnB())));
+        point.m_combinedFriction = s.friction;
+        point.m_combinedRestitution = s.restitution;
+    }
+
     void wake(const Box3& box) override {
         std::vector<uint32_t> found;
         near(box.inflated(0.1f), found);
@@ -154,6 +166,10 @@ protected:
         info.m_angularDamping = 1 - std::exp(-b.settings.angular_damping);
         object->body = std::make_unique<btRigidBody>(info);
         object->body->setUserIndex(int(index));
+        object->body->setUserPointer(this);
+        if (!b.settings.surfaces.empty())
+            object->body->setCollisionFlags(object->body->getCollisionFlags() |
+                                            btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
         object->continuous = dynamic && b.settings.continuous;
         if (b.settings.motion == Motion::Kinematic) {
             object->body->setCollisionFlags(object->body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
@@ -305,6 +321,13 @@ private:
     Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &solver_, &configuration_};
     std::vector<std::unique_ptr<Object>> objects_;
 };
+
+bool contact_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int, int,
+                   const btCollisionObjectWrapper* b, int, int) {
+    const btCollisionObject &object_a = *a->getCollisionObject(), &object_b = *b->getCollisionObject();
+    static_cast<const BulletWorld*>(object_a.getUserPointer())->give_surface(point, object_a, object_b);
+    return true;
+}
 
 void Dynamics::integrateTransforms(btScalar seconds) {
     const std::vector<BulletWorld::Held> held = owner_.hold_back(seconds);

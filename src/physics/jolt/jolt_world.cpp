@@ -280,11 +280,23 @@ private:
         const std::lock_guard lock(mutex_);
         touching_.push_back({std::min(a, b), std::max(a, b), manifold.mPenetrationDepth});
     }
-    void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings&) override {
+    // Of a contact with a body that is not the same all over. Called while Jolt steps, when no body moves.
+    void give_surface(const JPH::Body& body1, const JPH::Body& body2, const ContactManifold& m,
+                      ContactSettings& settings) const {
+        const uint32_t a = uint32_t(body1.GetUserData()), b = uint32_t(body2.GetUserData());
+        if (bodies()[a].settings.surfaces.empty() && bodies()[b].settings.surfaces.empty()) return;
+        const Surface s = of_pair(surface(a, to_vec(m.GetWorldSpaceContactPointOn1(0))),
+                                  surface(b, to_vec(m.GetWorldSpaceContactPointOn2(0))));
+        settings.mCombinedFriction = s.friction;
+        settings.mCombinedRestitution = s.restitution;
+    }
+    void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings& s) override {
+        give_surface(a, b, m, s);
         note(a, b, m);
     }
     void OnContactPersisted(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m,
-                            ContactSettings&) override {
+                            ContactSettings& s) override {
+        give_surface(a, b, m, s);
         note(a, b, m);
     }
 
