@@ -38,12 +38,13 @@ CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_siz
     return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
 }
 
-bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows) {
-    if (rows.empty()) return false;
-    return std::any_of(code.begin(), code.end(), [&](sdf::Instruction in) {
-        return in.has_material() &&
-               std::find(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2])) != rows.end();
-    });
+bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,
+           sdf::ListCuller::Start start) {
+    if (!(sdf::ListCuller::start_of(code, program) == start)) return false;
+    return rows.empty() || std::none_of(code.begin(), code.end(), [&](sdf::Instruction in) {
+               return in.has_material() &&
+                      std::find(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2])) != rows.end();
+           });
 }
 
 // Rows that reach the box of cells, in order.

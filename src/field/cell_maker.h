@@ -47,8 +47,9 @@ inline ivec3 all_of(int a) { return {a, a, a}; }
 /// World cells whose bricks an edit can change; far beyond any world where it is everywhere. Empty: none.
 CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size);
 
-/// Whether a brick's code uses one of these rows.
-bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows);
+/// Whether a brick's code stays what it was when `rows` go, and it would begin so.
+bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,
+           sdf::ListCuller::Start start);
 
 /// One thread's. A sink says which cells it wants and takes what they are:
 ///     bool wants(const CellBox& cells)      whether it wants any of these; may err towards yes
@@ -56,7 +57,7 @@ bool uses_any(std::span<const sdf::Instruction> code, const sdf::Program& progra
 ///     bool stop()                           asked before each cell that may own a brick: leave the rest alone
 ///     void air(const CellBox& cells)        these are empty and outside, also those it does not want
 ///     void empty(ivec3 cell, bool inside)
-///     bool keeps(ivec3 cell, bool came)     its brick is as it was; `came`: one of `inserted` may be in its code
+///     bool keeps(ivec3 cell, bool came, ListCuller::Start)    its brick is as it was; `came`: one of `inserted` is in its code
 ///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
 class CellMaker {
 public:
@@ -223,7 +224,7 @@ void CellMaker::run_cells(Sink& sink) {
     culler_.keep(cells_, open);
     const uint64_t came = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
     for (int i = 0; i < 64; ++i) {
-        if ((open >> i & 1u) == 0 || sink.keeps(cell_[i], (came >> i & 1u) != 0)) continue;
+        if ((open >> i & 1u) == 0 || sink.keeps(cell_[i], (came >> i & 1u) != 0, culler_.start_of(cells_, i))) continue;
         if (sink.stop()) return;
         if (evaluate(cell_[i], i)) {
             sink.brick(cell_[i], *this);

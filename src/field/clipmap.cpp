@@ -226,6 +226,17 @@ void Clipmap::add_parts(Batch& batch, const CellBox& clip) const {
     });
 }
 
+// The batch is what its level is to show next.
+void Clipmap::begin(Batch& batch, int level) const {
+    for (const std::vector<uint32_t>* rows : {&batch.removed, &batch.inserted}) {
+        for (const uint32_t row : *rows) {
+            const CellBox box = cells_reached(*batch.program, row, voxel_size(level));
+            if (!box.empty()) batch.boxes.push_back(box);
+        }
+    }
+    add_parts(batch, window(level));
+}
+
 void Clipmap::edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes) {
     newest_ = std::move(program);
     const int64_t all = int64_t(options_.cells) * options_.cells * options_.cells;
@@ -241,18 +252,12 @@ void Clipmap::edit(std::shared_ptr<const sdf::Program> program, std::span<const 
         if (!batch) batch.emplace().since = works_;
         batch->program = newest_;
         ++batch->changes;
-        const auto add = [&](uint32_t row, std::vector<uint32_t>& rows) {
-            if (row == kNoRow) return;
-            rows.push_back(row);
-            const CellBox box = cells_reached(*newest_, row, voxel_size(level));
-            if (!box.empty()) batch->boxes.push_back(box);
-        };
         for (const RowChange& change : changes) {
-            add(change.removed, batch->removed);
-            add(change.inserted, batch->inserted);
+            if (change.removed != kNoRow) batch->removed.push_back(change.removed);
+            if (change.inserted != kNoRow) batch->inserted.push_back(change.inserted);
         }
         if (&batch != &l.active) continue;
-        add_parts(*batch, window(level));
+        begin(*batch, level);
         if (batch->parts.empty()) {  // out of sight
             l.program = newest_;
             batch.reset();
@@ -313,7 +318,7 @@ bool Clipmap::fill(int level, Run& run) {
             ++made.cells;
             made.empties.push_back({c, inside});
         }
-        static bool keeps(ivec3, bool) { return false; }
+        static bool keeps(ivec3, bool, sdf::ListCuller::Start) { return false; }
         void brick(ivec3 c, CellMaker& maker) { add_brick(c, maker); }
     };
 
@@ -384,10 +389,10 @@ bool Clipmap::apply(int level, Run& run) {
             if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside)
                 made.empties.push_back({c, inside});
         }
-        bool keeps(ivec3 c, bool came) {
+        bool keeps(ivec3 c, bool came, sdf::ListCuller::Start start) {
             const uint32_t word = level.cells.at(c.x, c.y, c.z);
             if (came || word == kCellMissing || (word & kCellOccupied) == 0) return false;
-            if (uses_any(map.code_of(word & kCellSlotMask), *batch.program, batch.removed)) return false;
+            if (!stays(map.code_of(word & kCellSlotMask), *batch.program, batch.removed, start)) return false;
             set_done(c);
             return true;
         }
@@ -434,7 +439,7 @@ bool Clipmap::apply(int level, Run& run) {
         l.waiting.reset();
         for (Made& m : made) publish(level, m, window);
         if (!l.active) break;
-        add_parts(*l.active, window);
+        begin(*l.active, level);
     }
     return true;
 }

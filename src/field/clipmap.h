@@ -154,6 +154,7 @@ private:
     CellLattice lattice(int level, ivec3 block) const;
     void enter(int level, const CellBox& box);
     void queue_blocks(Level& level, const CellBox& box) const;
+    void begin(Batch& batch, int level) const;
     void add_parts(Batch& batch, const CellBox& clip) const;
     bool fill(int level, Run& run);
     bool apply(int level, Run& run);

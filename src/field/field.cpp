@@ -119,10 +119,10 @@ private:
             }
         }
         void empty(ivec3 cell, bool inside) { builder.set_empty(cell, inside, task, result); }
-        bool keeps(ivec3 cell, bool came) const {
+        bool keeps(ivec3 cell, bool came, sdf::ListCuller::Start start) const {
             const uint32_t word = whole() ? 0u : builder.old_->cells_.at(cell.x, cell.y, cell.z);
             return (word & kCellOccupied) != 0 && !came &&
-                   !uses_any(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_);
+                   stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);
         }
         void brick(ivec3 cell, CellMaker& maker) {
             Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), true, {}};

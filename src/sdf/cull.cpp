@@ -222,6 +222,24 @@ std::optional<uint16_t> ListCuller::only_material(const Fold& fold, int ball) co
     return out == kNoMaterial ? uint16_t(kDefaultMaterial) : out;
 }
 
+ListCuller::Start ListCuller::start_of(const Fold& fold, int ball) const {
+    Start out{(fold.from_empty >> ball & 1u) != 0, UINT32_MAX};
+    for (size_t first = 0; first < fold.list.count; first += 64) {
+        const uint64_t kept = fold.kept[first + size_t(ball)];
+        if (kept == 0) continue;
+        out.row = entries_[fold.list.first + first + size_t(std::countr_zero(kept))].row;
+        break;
+    }
+    return out;
+}
+
+ListCuller::Start ListCuller::start_of(std::span<const Instruction> code, const Program& program) {
+    Start out{!code.empty() && code[0].opcode() == Opcode::Empty, UINT32_MAX};
+    const auto first = std::find_if(code.begin(), code.end(), [](Instruction in) { return in.has_material(); });
+    if (first != code.end()) out.row = uint32_t(program.params[first->param + 2]);
+    return out;
+}
+
 void ListCuller::drop(const List& list) {
     entries_.resize(list.first);
     code_.resize(list.code);

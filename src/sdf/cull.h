@@ -48,6 +48,15 @@ public:
     void emit(const Fold& fold, int ball, std::vector<Instruction>& out);
     /// The one material of everything in the ball, where its edits have but one.
     std::optional<uint16_t> only_material(const Fold& fold, int ball) const;
+    /// How the ball's code begins. What was before that, and lost, is not in the code; yet it may have lost only because of an edit
+    /// that is gone, or has come, and lost with it: code is another where its beginning is.
+    struct Start {
+        bool from_empty = true;
+        uint32_t row = UINT32_MAX;
+        friend bool operator==(const Start&, const Start&) = default;
+    };
+    Start start_of(const Fold& fold, int ball) const;
+    static Start start_of(std::span<const Instruction> code, const Program& program);
     /// Drops `list` and all lists made after it.
     void drop(const List& list);
 

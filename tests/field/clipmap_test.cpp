@@ -273,15 +273,17 @@ TEST(Clipmap, ChangesDirtyOnlyWhatTheyReachAndLevelsShowWholeStates) {
         if (r.below(2) == 0 && edits.size() > 100) {
             edits.erase(edits.begin() + 1 + r.below(int(edits.size()) - 1));
         } else {
-            Edit e = r.edit(4.0f);
+            Edit e = r.edit(7.0f);
             e.node.transform.scale = {3, 3, 3};
+            e.node.transform.position = e.node.transform.position + vec3{float(map.focus().x), 0, float(map.focus().z)};
             edits.insert(edits.begin() + 1 + r.below(int(edits.size())), e);
         }
         map.edit(live.program(), {});  // no change is no work
         const std::vector<RowChange> changes = live.become(edits);
         map.edit(live.program(), changes);
-        if (step % 3 == 1) map.move({0.5 * step, 0.5, -0.3 * step});
-        map.work({.bricks = step % 4 == 0 ? 100000u : 60u});
+        map.work({.bricks = step % 8 == 0 ? 100000u : 60u});
+        map.move({0.4 * step, 0.5, -0.3 * step});
+        map.work({.bricks = 60});
         for (int level = 0; level < map.level_count(); ++level) waited += map.counts(level).edits_waiting > 0;
         if (step % 5 == 0) expect_is_its_program(map, "step " + std::to_string(step));
     }
@@ -353,6 +355,9 @@ TEST(Clipmap, KeepsToItsBudgetAndIsWholeAtOnceAfterATeleport) {
         for (int level = 0; level < 3; ++level) {
             baked += map.counts(level).baked;
             skipped += map.counts(level).skipped;
+            if (map.counts(level).skipped) {
+                EXPECT_EQ(map.counts(level).baked, 0u);
+            }
         }
         ASSERT_LE(baked, budget) << "frame " << frame;
         ASSERT_EQ(map.counts(3).missing_cells, 0u) << "the picture has a hole in frame " << frame;
@@ -392,17 +397,21 @@ TEST(Clipmap, APoolTooSmallGivesTheLeastImportantBricksBack) {
     EXPECT_GT(map.counts(0).refused_cells, 0u);
     for (int level = 1; level < 4; ++level) EXPECT_EQ(map.counts(level).missing_cells, 0u) << level;
     // What is left are the nearest.
-    const auto away = [&](ivec3 c) {
-        const double side = double(map.voxel_size(0)) * 7;
-        return std::max({std::fabs(c.x + 0.5), std::fabs(c.y + 0.5 - 0.5 / side), std::fabs(c.z + 0.5)});
+    const auto check = [&](const std::string& when) {
+        const auto away = [&](ivec3 c) {
+            const double side = double(map.voxel_size(0)) * 7;
+            return std::max({std::fabs(c.x + 0.5), std::fabs(c.y + 0.5 - 0.5 / side), std::fabs(c.z + 0.5)});
+        };
+        double kept = 0, gone = 1e9;
+        each_cell(map.window(0), [&](ivec3 c) {
+            const uint32_t word = map.cell_word(0, c);
+            if (word == kCellMissing) gone = std::min(gone, away(c));
+            if ((word & kCellOccupied) != 0 && word != kCellMissing) kept = std::max(kept, away(c));
+        });
+        EXPECT_LT(kept, gone + 17) << "in blocks of 16 cells, " << when;
+        EXPECT_GT(kept, 2) << when;
     };
-    double kept = 0, gone = 1e9;
-    each_cell(map.window(0), [&](ivec3 c) {
-        const uint32_t word = map.cell_word(0, c);
-        if (word == kCellMissing) gone = std::min(gone, away(c));
-        if ((word & kCellOccupied) != 0 && word != kCellMissing) kept = std::max(kept, away(c));
-    });
-    EXPECT_LT(kept, gone + 17) << "in blocks of 16 cells";
+    check("at first");
     map.work();
     EXPECT_EQ(map.counts(0).baked, 0u) << "steady";
     expect_is_its_program(map, "full");
@@ -415,6 +424,20 @@ TEST(Clipmap, APoolTooSmallGivesTheLeastImportantBricksBack) {
     map.work();
     for (int level = 1; level < 4; ++level) EXPECT_EQ(map.counts(level).missing_cells, 0u);
     expect_is_its_program(map, "full again");
+    // A change that coarse levels need more bricks for.
+    std::vector<Edit> more = country(400);
+    for (int i = 0; i < 60; ++i)
+        more.push_back(worlds::edit(Sphere{.radius = 1}, {-24 + 8.0f * float(i % 8), 4, -24 + 8.0f * float(i / 8)}));
+    worlds::Live live(country(400));
+    map = made(live.program(), {0, 0.5, 0}, options);
+    map.work();
+    map.edit(live.program(), live.become(more));
+    const uint32_t before = map.counts(0).bricks;
+    map.work();
+    EXPECT_LT(map.counts(0).bricks, before);
+    EXPECT_GT(map.counts(0).evicted, 0u);
+    for (int level = 1; level < 4; ++level) EXPECT_EQ(map.counts(level).missing_cells, 0u) << level;
+    check("after the change");
 }
 
 double exact(const sdf::Program& program, dvec3 p) { return sdf::evaluate(sdf::view(program), p); }
@@ -454,7 +477,38 @@ TEST(Clipmap, NoLevelSaysMoreThanTheTrueDistance) {
     }
 }
 
-// Steps of a twentieth of a voxel change what is drawn by no more than half a voxel of the level, across every seam.
+// What level_field.gpu.h and the march rely on where they leave empty fine cells alone.
+TEST(Clipmap, AnEmptyCellIsEmptyInTheCoarserLevelToo) {
+    worlds::Random r(21);
+    std::vector<Edit> edits;
+    for (int i = 0; i < 300; ++i) {
+        Edit e = worlds::edit(Box{.half_extents = {r.in(0.01f, 0.4f), r.in(0.01f, 0.4f), r.in(0.01f, 0.1f)}},
+                              r.point(2.0f), i % 3 == 2 ? Op::Subtract : Op::Union);
+        e.node.transform.rotation = axis_angle(r.direction(), r.in(-3, 3));
+        edits.push_back(e);
+    }
+    const auto program = worlds::compiled(edits);
+    Clipmap fine = made(program, {0, 0, 0}, {.voxel_size = 0.025f, .levels = 1, .cells = 32});
+    Clipmap coarse = made(program, {0, 0, 0}, {.voxel_size = 0.05f, .levels = 1, .cells = 32});
+    fine.work();
+    coarse.work();
+    int looked = 0, wrong = 0;
+    each_cell(fine.window(0), [&](ivec3 c) {
+        const uint32_t word = fine.cell_word(0, c);
+        if ((word & kCellOccupied) != 0 || (word & 7u) > 1) return;
+        for (int i = 0; i < 512; ++i) {
+            const ivec3 t{c.x * 7 + (i & 7), c.y * 7 + (i >> 3 & 7), c.z * 7 + (i >> 6)};
+            const auto s = coarse.sample({0.025 * t.x, 0.025 * t.y, 0.025 * t.z});
+            if (!s.from_brick) continue;
+            ++looked;
+            wrong += (s.distance <= 0) != ((word & kCellInside) != 0);
+        }
+    });
+    EXPECT_GT(looked, 10000);
+    EXPECT_EQ(wrong, 0);
+}
+
+// Steps of a twentieth of a voxel change what is drawn by no more than a tenth of one, across every seam; half a voxel is asked for.
 TEST(Clipmap, DistanceIsContinuousAcrossTheZones) {
     const auto program = worlds::compiled(country());
     for (const uint32_t budget : {std::numeric_limits<uint32_t>::max(), 900u}) {
@@ -489,7 +543,7 @@ TEST(Clipmap, DistanceIsContinuousAcrossTheZones) {
                 p[axis] += 0.05 * h;
             }
         }
-        EXPECT_LE(worst, 0.5) << "budget " << budget;
+        EXPECT_LE(worst, 0.1) << "budget " << budget;
         EXPECT_GT(across, 30);
     }
 }

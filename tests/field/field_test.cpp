@@ -193,6 +193,25 @@ TEST(Field, IsTheSameFarFromTheOrigin) {
     }
 }
 
+// A cut that loses nothing deep in a solid has code of its own alone; when the solid goes (or comes), that is another.
+TEST(Field, AChangeThatACutHidReachesTheCutsBricks) {
+    const std::vector<Edit> without{worlds::edit(Box{.half_extents = {0.9f, 0.5f, 0.9f}}, {0, -0.5f, 0}),
+                                    worlds::edit(Sphere{.radius = 0.4f}, {}, Op::Subtract)};
+    std::vector<Edit> with = without;
+    with.insert(with.begin() + 1, worlds::edit(Box{.half_extents = {1.1f, 1.1f, 1.1f}}));
+    const FieldOptions options{.voxel_size = 0.02f, .bounds = {{-1.3f, -1.3f, -1.3f}, {1.3f, 1.3f, 1.3f}}};
+    for (const bool goes : {true, false}) {
+        worlds::Live live(goes ? with : without);
+        auto bricks = HostBricks::build(live.program(), options);
+        ASSERT_TRUE(bricks);
+        const std::vector<RowChange> changes = live.become(goes ? without : with);
+        ASSERT_TRUE(bricks->update(live.program(), changes));
+        auto fresh = HostBricks::build(live.program(), options);
+        ASSERT_TRUE(fresh);
+        EXPECT_EQ(bricks->hash(), fresh->hash()) << (goes ? "goes" : "comes");
+    }
+}
+
 TEST(Field, AFullPoolNamesTheNumberNeeded) {
     worlds::World world = worlds::blends();
     const uint32_t needed = world.field()->stats().bricks;
