@@ -127,8 +127,10 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     std::unordered_set<std::string> owned;
     for (const scene::SceneBody& b : data.bodies) owned.insert(b.edits.begin(), b.edits.end());
     std::vector<Edit> ground;
-    for (const Edit& e : data.edits)
+    impl_->edits.each([&](uint32_t slot) {
+        const Edit& e = *impl_->edits[slot].edit;
         if (!owned.contains(e.name)) ground.push_back(e);
+    });
     std::vector<Ran> ran;
     std::vector<std::string> names;  // quoted, by index of the body
     const auto add = [&](const physics::BodySettings& body, std::string_view name) -> Result<void> {
@@ -169,9 +171,10 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
                          "bodies of meshes are not simulated yet; give it edits, such as one of the shape \"mesh\"");
         std::vector<Edit> edits;
         for (const std::string& name : body.edits) {
-            const auto at = impl_->position_of(name);
-            if (!at) return fault(body, formatted("its edit \"{}\" was removed; remove the body too", name));
-            edits.push_back(data.edits[*at]);
+            const uint32_t slot = impl_->edits.find(name);
+            if (slot == scene::EditList::kNone)
+                return fault(body, formatted("its edit \"{}\" was removed; remove the body too", name));
+            edits.push_back(*impl_->edits[slot].edit);
         }
         const physics::Pose frame = frame_of(edits.front());
         edits = in_frame(std::move(edits));

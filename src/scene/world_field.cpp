@@ -235,7 +235,7 @@ Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 fo
     const std::shared_ptr<const sdf::Program> now = compiled();
     const std::lock_guard lock(mutex);
     const dvec3 at{double(focus.x), double(focus.y), double(focus.z)};
-    if (levels && same(settings, levels_with)) {
+    if (levels && settings == levels_with) {
         if (!level_changes.empty()) levels->edit(now, level_changes);
         levels->move(at);
     } else {

@@ -140,7 +140,8 @@ TEST_F(LevelsGpu, TexelsAreTheClipmapsAfterMovesAndChanges) {
     for (size_t i = 0; i < slots.size(); ++i) {
         const field::BrickContent& brick = map.content(slots[i]);
         for (size_t t = 0; t < 512; ++t)
-            wrong += texels[i].distance_codes[t] != (*brick.half)[t] || texels[i].material_words[t] != brick.word(t);
+            wrong +=
+                texels[i].distance_codes[t] != brick.half->codes[t] || texels[i].material_words[t] != brick.word(t);
         for (size_t k = 0; k < 16; ++k) wrong += texels[i].palette[k] != brick.palette(k);
     }
     EXPECT_EQ(wrong, 0);
