@@ -128,10 +128,10 @@ void CellMaker::run_block(ivec3 at, const CellBox& bounds, Sink& sink) {
             {std::max(b.min.x, bounds.min.x), std::max(b.min.y, bounds.min.y), std::max(b.min.z, bounds.min.z)},
             {std::min(b.max.x, bounds.max.x), std::min(b.max.y, bounds.max.y), std::min(b.max.z, bounds.max.z)}};
     };
-    const CellBox block = cut({at, at + all_of(kBlockCells)});
-    find_rows(block);
+    const CellBox block{at, at + all_of(kBlockCells)};
+    find_rows(block);  // all of it: what a cell becomes is to be a function of program, block and cell alone
     if (rows_.empty()) {
-        sink.air(block);
+        sink.air(cut(block));
         return;
     }
     groups_.list = culler_.list_of(rows_);

@@ -4,8 +4,9 @@
 // coarser level there. edit() queues what a change reaches; a level shows it when all its bricks are made, the old ones until then. work()
 // keeps to a budget.
 //
-// At any time a level shows exactly one state of the world, level_program(): its bricks hold, bit for bit, what a field of that program
-// built from nothing would; but for missing cells. A value: a copy is cheap and shares every page that did not change, so snapshots
+// At any time a level shows exactly one state of the world, level_program(): its bricks hold, bit for bit, the distances that a field of
+// that program built from nothing would, but for missing cells. Materials deep under cuts may differ from a field's, whose blocks of
+// cells begin elsewhere. A value: a copy is cheap and shares every page that did not change, so snapshots
 // are kept by copying. Reading is for any thread; changing is the owner's.
 #pragma once
 

@@ -193,10 +193,10 @@ TEST(Field, IsTheSameFarFromTheOrigin) {
     }
 }
 
-// A cut that loses nothing deep in a solid has code of its own alone; when the solid goes (or comes), that is another.
+// Deep in a solid a cut with a material has code of its own alone; when the solid goes (or comes), that is another.
 TEST(Field, AChangeThatACutHidReachesTheCutsBricks) {
     const std::vector<Edit> without{worlds::edit(Box{.half_extents = {0.9f, 0.5f, 0.9f}}, {0, -0.5f, 0}),
-                                    worlds::edit(Sphere{.radius = 0.4f}, {}, Op::Subtract)};
+                                    worlds::of_material(worlds::edit(Sphere{.radius = 0.4f}, {}, Op::Subtract), 2)};
     std::vector<Edit> with = without;
     with.insert(with.begin() + 1, worlds::edit(Box{.half_extents = {1.1f, 1.1f, 1.1f}}));
     const FieldOptions options{.voxel_size = 0.02f, .bounds = {{-1.3f, -1.3f, -1.3f}, {1.3f, 1.3f, 1.3f}}};
