@@ -98,7 +98,7 @@ void expect_is_its_program(const Clipmap& map, int level, const std::string& whe
         if (same && !brick) same = (word & kCellInside) == (want & kCellInside);
         if (same && brick) {
             const BrickRecord& record = map.records()[word & kCellSlotMask];
-            same = *map.content(word & kCellSlotMask).half == *built->content(want & kCellSlotMask).half &&
+            same = map.content(word & kCellSlotMask).half->codes == built->content(want & kCellSlotMask).half->codes &&
                    record.texel_x == c.x * 7 && record.texel_y == c.y * 7 && record.texel_z == c.z * 7 &&
                    record.level == uint32_t(level) && record.code_count > 0;
         }

@@ -73,7 +73,7 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
 TEST(Layout, LevelsAreTheSame) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
-    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 6u}, {&kResolveLevels, 13u}, {&kShadowLevels, 9u}}) {
+    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 9u}}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, number);
         ASSERT_TRUE(b) << kernel->name;
