@@ -14,7 +14,7 @@ namespace kiln::cli {
 namespace {
 
 struct Options {
-    std::string scene;
+    std::string scene, edits;
     SimulateSettings settings;
     bool json = false;
 };
@@ -25,8 +25,14 @@ int simulate(const Options& o) {
     for (const std::string& section : world->not_drawn_yet())
         if (section != "bodies" && section != "meshes" && section != "triggers")
             say("kiln simulate: " + o.scene + ": this version does not simulate \"" + section + "\"");
+    SimulateSettings settings = o.settings;
+    if (!o.edits.empty()) {
+        auto commands = read_timed_commands(o.edits);
+        if (!commands) return fail(commands.error());
+        settings.edits = std::move(*commands);
+    }
     const Stopwatch watch;
-    const auto ways = world->simulate_json(o.settings);
+    const auto ways = world->simulate_json(settings);
     if (!ways) return fail(ways.error());
     if (o.json) {
         (void)put(*ways);
@@ -54,6 +60,8 @@ void add_simulate(CLI::App& app, Run& run) {
     verb->add_option("--backend", o->settings.backend, "physics engine, see `kiln doctor`; left out: the default");
     verb->add_flag("--field-bodies", o->settings.field_bodies,
                    "boxes, balls, capsules and cylinders collide as fields too");
+    verb->add_option("--edits", o->edits,
+                     "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");
     verb->add_flag("--json", o->json, "the ways of all bodies, one object, on stdout");
     verb->callback([o, &run] { run = [o] { return simulate(*o); }; });

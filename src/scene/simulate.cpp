@@ -12,6 +12,7 @@
 
 #include <kiln/shapes.h>
 
+#include <algorithm>
 #include <cmath>
 #include <thread>
 #include <unordered_set>
@@ -81,6 +82,52 @@ public:
     std::string out;
 };
 
+// The world's list without the edits of bodies.
+std::vector<Edit> ground_of(const World::Impl& world, const std::unordered_set<std::string>& owned) {
+    std::vector<Edit> out;
+    world.edits.each([&](uint32_t slot) {
+        const Edit& e = *world.edits[slot].edit;
+        if (!owned.contains(e.name)) out.push_back(e);
+    });
+    return out;
+}
+
+Result<std::shared_ptr<const sdf::Program>> program_of(World::Impl& world, std::span<const Edit> edits) {
+    const std::lock_guard lock(world.mutex);
+    const auto source = scene::with_grids(edits, world.data.objects, world.data.folder, world.grids);
+    if (!source) return source.error();
+    auto program = sdf::compile(source->source());
+    if (!program) return program.error();
+    return std::make_shared<const sdf::Program>(std::move(*program));
+}
+
+Result<std::shared_ptr<const field::SdfField>> field_of(World::Impl& world, std::span<const Edit> edits) {
+    auto program = program_of(world, edits);
+    if (!program) return program.error();
+    return std::shared_ptr<const field::SdfField>(std::make_shared<field::ProgramField>(std::move(*program)));
+}
+
+// Where two lists of edits may differ: the edits between what they begin and what they end with.
+Result<Box3> changed_box(World::Impl& world, std::span<const Edit> before, std::span<const Edit> after) {
+    size_t same = 0, last = 0;
+    const size_t fewest = std::min(before.size(), after.size());
+    while (same < fewest && before[same] == after[same]) ++same;
+    while (last < fewest - same && before[before.size() - 1 - last] == after[after.size() - 1 - last]) ++last;
+    Box3 box;
+    for (const std::span<const Edit> list : {before, after}) {
+        std::vector<Edit> alone(list.begin() + ptrdiff_t(same), list.end() - ptrdiff_t(last));
+        float reach = 0;
+        for (Edit& e : alone) {
+            reach = std::max(reach, e.blend_radius);
+            e.op = Op::Union;
+        }
+        const auto program = program_of(world, alone);
+        if (!program) return program.error();
+        for (const sdf::EditSpan& edit : (*program)->edits) box = box_union(box, edit.bounds.inflated(reach));
+    }
+    return box;
+}
+
 struct Ran {
     std::string quoted;  // its id
     physics::BodyId id;
@@ -109,15 +156,6 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     if (!made) return made.error();
     physics::World& world = **made;
 
-    const auto compiled = [&](std::span<const Edit> edits) -> Result<std::shared_ptr<const field::SdfField>> {
-        const std::lock_guard lock(impl_->mutex);
-        const auto source = scene::with_grids(edits, data.objects, data.folder, impl_->grids);
-        if (!source) return source.error();
-        auto program = sdf::compile(source->source());
-        if (!program) return program.error();
-        return std::shared_ptr<const field::SdfField>(
-            std::make_shared<field::ProgramField>(std::make_shared<const sdf::Program>(std::move(*program))));
-    };
     const auto fault = [&](const scene::SceneBody& body, const std::string& message) -> Error {
         if (data.source.empty()) return {body.id + ": " + message, ErrorKind::Input};
         return data.source.error(body.place, message);
@@ -126,11 +164,8 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     // The ground.
     std::unordered_set<std::string> owned;
     for (const scene::SceneBody& b : data.bodies) owned.insert(b.edits.begin(), b.edits.end());
-    std::vector<Edit> ground;
-    impl_->edits.each([&](uint32_t slot) {
-        const Edit& e = *impl_->edits[slot].edit;
-        if (!owned.contains(e.name)) ground.push_back(e);
-    });
+    std::vector<Edit> ground = ground_of(*impl_, owned);
+    std::optional<physics::BodyId> ground_body;
     std::vector<Ran> ran;
     std::vector<std::string> names;  // quoted, by index of the body
     const auto add = [&](const physics::BodySettings& body, std::string_view name) -> Result<void> {
@@ -141,10 +176,8 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
         names[id->index] = ran.back().quoted;
         return {};
     };
-    {
-        auto field = compiled(ground);
-        if (!field) return field.error();
-        if (!(*field)->bounds().empty()) {
+    const auto add_ground = [&](std::shared_ptr<const field::SdfField> field) -> Result<void> {
+        if (!field->bounds().empty()) {
             // The scene's own where no material says.
             std::vector<physics::Surface> surfaces{{data.physics.friction, data.physics.restitution}};
             for (size_t i = 0; i < data.materials.size(); ++i) {
@@ -155,15 +188,22 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
                                     silent.restitution ? data.physics.restitution : m.restitution});
             }
             if (surfaces.size() == 1) surfaces.clear();
-            auto added = add({.shape = physics::SdfShape::fixed(std::move(*field)),
+            auto added = add({.shape = physics::SdfShape::fixed(std::move(field)),
                               .motion = physics::Motion::Static,
                               .friction = data.physics.friction,
                               .restitution = data.physics.restitution,
                               .surfaces = std::move(surfaces)},
                              kWorldName);
             if (!added) return added.error();
-            ran.clear();
+            ground_body = ran.back().id;
+            ran.pop_back();
         }
+        return {};
+    };
+    {
+        auto field = field_of(*impl_, ground);
+        if (!field) return field.error();
+        if (auto added = add_ground(std::move(*field)); !added) return added.error();
     }
     for (const scene::SceneBody& body : data.bodies) {
         if (body.edits.empty())
@@ -192,7 +232,7 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
         if (convex) {
             s.shape = *convex;
         } else {
-            auto field = compiled(edits);
+            auto field = field_of(*impl_, edits);
             if (!field) return field.error();
             if (body.motion == scene::SceneBody::Motion::Static) {
                 s.shape = physics::SdfShape::fixed(std::move(*field));
@@ -244,9 +284,48 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     const char* event_comma = "";
     const int64_t last = int64_t(steps);
     frame(0);
+    // The world as the commands change it; made when the first comes.
+    std::optional<World> edited;
+    size_t commands = 0;
+    const auto edit = [&](double now) -> Result<void> {
+        bool any = false;
+        for (; commands < settings.edits.size() && settings.edits[commands].time <= now + 1e-9; ++commands) {
+            if (!edited) {
+                auto copy = World::parse(to_json(), data.folder.empty() ? "scene" : data.folder + "/scene");
+                if (!copy) return copy.error();
+                edited = std::move(*copy);
+            }
+            const TimedCommand& command = settings.edits[commands];
+            if (auto done = edited->apply(command); !done) return done;
+            for (const std::string& name : owned) {
+                const uint32_t had = impl_->edits.find(name), has = edited->impl_->edits.find(name);
+                const bool same =
+                    had == scene::EditList::kNone
+                        ? has == had
+                        : has != scene::EditList::kNone && *impl_->edits[had].edit == *edited->impl_->edits[has].edit;
+                if (same) continue;
+                return Error{
+                    formatted("{}:{}: \"{}\" is a body's; commands change the world's own edits while bodies run",
+                              command.file, command.line, name),
+                    ErrorKind::Input};
+            }
+            any = true;
+        }
+        if (!any) return {};
+        std::vector<Edit> now_there = ground_of(*edited->impl_, owned);
+        const auto box = changed_box(*edited->impl_, ground, now_there);
+        if (!box) return box.error();
+        ground = std::move(now_there);
+        auto field = field_of(*edited->impl_, ground);
+        if (!field) return field.error();
+        if (!ground_body) return add_ground(std::move(*field));
+        world.set_field(*ground_body, physics::SdfShape::fixed(std::move(*field)), *box);
+        return {};
+    };
     // Frames fall on the steps nearest to multiples of `every`.
     int64_t frames = 1;
     for (int64_t i = 1; i <= last; ++i) {
+        if (auto done = edit(double(i - 1) * step); !done) return done.error();
         world.step(data.physics.step);
         for (const physics::ContactEvent& e : world.events()) {
             events.raw(event_comma).raw("\n  {").key("time").number(double(i) * step).raw(", ").key("type");

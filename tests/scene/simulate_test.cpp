@@ -62,6 +62,47 @@ constexpr const char* kTumble = R"({"format": 1,
     {"id": "b2", "edits": ["crate"]},
     {"id": "b3", "edits": ["ring", "cut"], "friction": 0.9}]})";
 
+// A ball at rest on a block; the block is dug away under it.
+constexpr const char* kDug = R"({"format": 1,
+  "edits": [
+    {"id": "block", "shape": "box", "half_extents": [2, 1, 2], "position": [0, -1, 0]},
+    {"id": "far", "shape": "box", "half_extents": [1, 1, 1], "position": [30, -1, 0]},
+    {"id": "ball", "shape": "sphere", "radius": 0.5, "position": [0, 0.5, 0]},
+    {"id": "other", "shape": "sphere", "radius": 0.5, "position": [30, 0.5, 0]}],
+  "bodies": [{"id": "b", "edits": ["ball"]}, {"id": "o", "edits": ["other"]}]})";
+
+TEST(Simulate, WhatIsDugAwayUnderABodyLetsItFallWithTheNextStep) {
+    const World world = parsed(kDug);
+    const std::vector<TimedCommand> dig = {
+        {2.0, "dig",
+         R"({"time": 2, "command": {"add": {"id": "hole", "shape": "box", "half_extents": [1, 3, 1], "op": "subtract"}}})",
+         1}};
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 2.5, .backend = engine, .edits = dig});
+        const auto fall = [&](int frame) {
+            return body(out["frames"][size_t(frame)], "b")["linear_velocity"][1].get<double>();
+        };
+        EXPECT_NEAR(fall(120), 0, 1e-3) << engine;
+        EXPECT_NEAR(fall(121), -9.81 / 60, 0.01 * 9.81 / 60) << engine;
+        EXPECT_NEAR(fall(130), -9.81 / 6, 0.02 * 9.81) << engine;
+        EXPECT_TRUE(body(out["frames"][150], "o")["asleep"].get<bool>()) << engine << ": what lies elsewhere sleeps on";
+        const json again = run(world, {.seconds = 2.5, .backend = engine, .threads = 2, .edits = dig});
+        EXPECT_EQ(again, out) << engine;
+    }
+    EXPECT_TRUE(world.find_edit("block") && !world.find_edit("hole")) << "the world stays as it is";
+}
+
+TEST(Simulate, CommandsThatCannotBeMadeSayWhere) {
+    const World world = parsed(kDug);
+    const auto told = [&](const std::string& command) {
+        const auto out = world.simulate_json(
+            {.seconds = 0.1, .edits = {{0.0, "edits.jsonl", R"({"time": 0, "command": )" + command + "}", 7}}});
+        return out ? std::string("no error") : out.error().message;
+    };
+    EXPECT_THAT(told(R"({"remove": "ball"})"), HasSubstr("edits.jsonl:7: \"ball\" is a body's"));
+    EXPECT_THAT(told(R"({"remove": "nobody"})"), HasSubstr("edits.jsonl:7"));
+}
+
 TEST(Simulate, SaysWhatTheContractNames) {
     const World world = parsed(kTumble);
     for (const std::string& engine : engines()) {
