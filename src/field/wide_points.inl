@@ -64,6 +64,7 @@ struct Located {
         cell = cell_place(view, {held(x.cell), held(y.cell), held(z.cell)});
     }
     I row() const { return to_int(y.voxel * 8.0f + x.voxel); }
+    I texel() const { return to_int(z.voxel * 64.0f + (y.voxel * 8.0f + x.voxel)); }  // any number beyond the grid
     F3 part() const { return {x.part, y.part, z.part}; }
     // The answer where there is no brick, voxels.
     F empty(I flags) const {
@@ -93,7 +94,7 @@ static inline void wait_for(const WideView& view, const Located& p, Waiting& out
     I flags;
     out.brick = entries_of(view, p.cell, flags);
     out.occupied = both(p.inside, is_occupied(flags));
-    out.texel = select(out.occupied, to_int(p.z.voxel) * 64 + p.row(), splat(0));
+    out.texel = select(out.occupied, p.texel(), splat(0));
     out.part = p.part();
     out.empty = number(0);
     if (any(without(p.inside, out.occupied))) out.empty = p.empty(flags);

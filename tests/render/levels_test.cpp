@@ -164,7 +164,7 @@ image::Rgb shown(const Picture& picture) {
     return out;
 }
 
-TEST(Levels, DrawWhatOneLevelDraws) {
+TEST(LevelPicturesGpu, DrawWhatOneLevelDraws) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP();
     const field::worlds::World world = on_ground();
@@ -191,7 +191,7 @@ TEST(Levels, DrawWhatOneLevelDraws) {
 }
 
 // Levels snap to new places under a camera that goes a centimetre a frame.
-TEST(Levels, NothingPopsOnADolly) {
+TEST(LevelPicturesGpu, NothingPopsOnADolly) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP();
     Clipmap map = made(field::worlds::compiled(hills()), {0, 0.9, 3}, 0.02f, 6);
