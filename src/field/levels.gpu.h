@@ -14,15 +14,13 @@
 #ifndef KILN_FIELD_LEVELS_GPU_H
 #define KILN_FIELD_LEVELS_GPU_H
 
+#include "field/level_cells.gpu.h"
 #include "field/brick.gpu.h"
 #include "field/cubic.gpu.h"
 
 KILN_FIELD_BEGIN
 
 KILN_CONST int kMostLevels = 16;
-// Fewer would let a level's fading part reach past the next; the words of more, on all levels, would fill more than a buffer (128 MiB).
-KILN_CONST int kFewestLevelCells = 32;
-KILN_CONST int kMostLevelCells = 128;
 KILN_CONST int kSlackCells = 2;
 // A cell of a level owns a brick iff some texel is nearer than this many voxels. From 1.13 on, an empty cell is empty in the coarser level
 // too: the coarse field at a corner of the cell is the mean of up to 8 coarse texels, of which those outside the cell lie 1,

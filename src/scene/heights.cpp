@@ -77,12 +77,6 @@ Result<uint32_t> mesh_number(const Shape& shape, const std::string& folder, Grid
 
 }  // namespace
 
-Resource resource_of(uint16_t shape_kind) {
-    if (ShapeKind(shape_kind) == ShapeKind::SampledMesh)
-        return {"bunny.obj", "a model (.glb, .gltf, .obj, .off, .ply, .stl)"};
-    return {"heights.png", "a PNG image"};
-}
-
 Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Object>& objects,
                               const std::string& folder, Grids& grids, sdf::Fault* fault) {
     GridSource out;

@@ -6,6 +6,8 @@
 #include "model/bake.h"
 #include "sdf/program.h"
 
+#include <kiln/shapes.h>
+
 #include <map>
 #include <string>
 #include <vector>
@@ -33,7 +35,11 @@ struct Grids {
 struct Resource {
     std::string_view example, what;
 };
-Resource resource_of(uint16_t shape_kind);
+inline Resource resource_of(uint16_t shape_kind) {
+    if (ShapeKind(shape_kind) == ShapeKind::SampledMesh)
+        return {"bunny.obj", "a model (.glb, .gltf, .obj, .off, .ply, .stl)"};
+    return {"heights.png", "a PNG image"};
+}
 
 /// The grey values (of colours: red) of a PNG image, 0 for black and 1 for white, as they stand (no gamma).
 Result<sdf::HeightGrid> load_heights(const std::string& path);

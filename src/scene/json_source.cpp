@@ -3,6 +3,8 @@
 
 #include "scene/json_source.h"
 
+#include "base/format.h"
+
 #include <charconv>
 #include <limits>
 #include <unordered_set>
@@ -469,11 +471,20 @@ std::string JsonDocument::path(JsonIndex target) const {
 
 Error JsonDocument::error_at(uint32_t offset, JsonIndex i, const std::string& message) const {
     const TextPlace p = place_at(offset);
-    std::string out = name_ + ":" + std::to_string(p.line) + ":" + std::to_string(p.column) + ": ";
+    std::string told;
     if (i < nodes_.size()) {
-        if (const std::string where = path(i); !where.empty()) out += where + ": ";
+        if (const std::string where = path(i); !where.empty()) told = where + ": ";
     }
-    return {out + message, ErrorKind::Input};
+    told += message;
+    std::string out = name_ + ":" + std::to_string(p.line) + ":" + std::to_string(p.column) + ": ";
+    for (const char c : told) {  // keys and values may hold ends of lines; an error is one line
+        if (uint8_t(c) < 0x20 || c == 0x7f) {
+            out += formatted("\\u{:04x}", unsigned(uint8_t(c)));
+        } else {
+            out += c;
+        }
+    }
+    return {out, ErrorKind::Input};
 }
 
 Error JsonDocument::error(JsonIndex i, const std::string& message) const {

@@ -8,7 +8,7 @@
 #include "scene/read_values.h"
 
 #include "base/format.h"
-#include "field/levels.gpu.h"
+#include "field/level_cells.gpu.h"
 
 #include <bit>
 #include <cmath>

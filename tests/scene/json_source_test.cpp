@@ -125,6 +125,12 @@ RC_GTEST_PROP(JsonDocument, AnyTextRoundTripsThroughQuotes, (const std::string& 
     RC_ASSERT(in->key(1) == text);
 }
 
+TEST(JsonDocument, ErrorsAreOneLineWhateverKeysHold) {
+    auto d = JsonDocument::parse("{\"a\\nb\": 1}", "f");
+    ASSERT_TRUE(d);
+    EXPECT_EQ(d->error(1, "wrong\r\n").message, "f:1:10: a\\u000ab: wrong\\u000d\\u000a");
+}
+
 TEST(JsonPrint, FitsOnALineOrBreaks) {
     auto d = JsonDocument::parse("{\"a\":[1,2.50,\"x\"],\"e\":[],\"o\":{},\"n\":{\"k\":-0.0}}", "f");
     ASSERT_TRUE(d);
