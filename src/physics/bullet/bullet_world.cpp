@@ -51,7 +51,7 @@ public:
 private:
     static btDefaultCollisionConstructionInfo info() {
         btDefaultCollisionConstructionInfo out;
-        out.m_customCollisionAlgorithmMaxElementSize = 128;  // of the pool that algorithms come from
+        out.m_customCollisionAlgorithmMaxElementSize = 192;  // of the pool that algorithms come from
         return out;
     }
 };
@@ -105,6 +105,10 @@ public:
         // iterations, makes a stack of ten boxes sway more and more.
         solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
         solver.m_numIterations = 40;
+        // An island ends its iterations when the last one changed velocities by less than 3 mm/s in all.
+        solver.m_minimumSolverBatchSize = 1;
+        solver.m_leastSquaresResidualThreshold = 1e-5f;
+        dynamics_.setForceUpdateAllAabbs(false);
         solver.m_restitutionVelocityThreshold = 0.5f;
     }
     ~BulletWorld() override {
@@ -172,7 +176,8 @@ protected:
                                             btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
         object->continuous = dynamic && b.settings.continuous;
         if (b.settings.motion == Motion::Kinematic) {
-            object->body->setCollisionFlags(object->body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+            const int flags = object->body->getCollisionFlags() & ~btCollisionObject::CF_STATIC_OBJECT;
+            object->body->setCollisionFlags(flags | btCollisionObject::CF_KINEMATIC_OBJECT);
             object->body->setActivationState(DISABLE_DEACTIVATION);
         }
         object->body->setLinearVelocity(to_bullet(b.settings.linear_velocity));

@@ -214,7 +214,9 @@ protected:
 
     void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
         auto& shape = static_cast<JoltSdfShape&>(*objects_[index]->shape);
+        const bool same = shape.sdf().bounds() == field->bounds();
         shape.set(std::move(field));
+        if (same) return;
         interface().NotifyShapeChanged(objects_[index]->id, shape.GetCenterOfMass(), false, EActivation::DontActivate);
     }
 

@@ -75,7 +75,7 @@ void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
                     const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
     static thread_local std::vector<FieldContact> contacts;
     const Pose world = world_of(field_of(shape2), transform2);
-    collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1),
+    collide(field_of(shape2).sdf(), convex_of(shape1), inverse(world) * pose_of(transform1),
             settings.mMaxSeparationDistance, contacts);
     add(contacts, world, false, id1, id2, collector);
 }
