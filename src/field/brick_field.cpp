@@ -33,7 +33,9 @@ int floor_of(float v) {
     const int whole = int(v);
     return whole - (float(whole) > v ? 1 : 0);
 }
-int cell_on_axis(int texel) { return int(uint32_t(texel + kNearCells * kBrickVoxels) / uint32_t(kBrickVoxels)) - kNearCells; }
+int cell_on_axis(int texel) {
+    return int(uint32_t(texel + kNearCells * kBrickVoxels) / uint32_t(kBrickVoxels)) - kNearCells;
+}
 
 }  // namespace
 
@@ -71,8 +73,7 @@ std::shared_ptr<const BrickField> BrickField::of_body(std::shared_ptr<const SdfF
         std::move(exact), BrickFieldOptions{.voxel_size = voxel, .near = least, .most_bricks = kBodyBricks});
 }
 
-std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfField> exact,
-                                                    const Box3& changed) const {
+std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfField> exact, const Box3& changed) const {
     auto out = std::make_shared<BrickField>(std::move(exact), options_);
     // A value can change only where the change is nearer than the value is large, and bricks hold values up to `near` and a diagonal.
     const float reach = options_.near + 3 * kHalfDiagonal * kBrickVoxels * options_.voxel_size;
@@ -83,7 +84,8 @@ std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfFie
 std::shared_ptr<const SdfField> BrickField::renewed() const {
     const uint32_t now = generation_.fetch_add(1, std::memory_order_relaxed);
     const size_t most = options_.most_bricks;
-    if (bricks_.load(std::memory_order_relaxed) < most && cells_.load(std::memory_order_relaxed) < 2 * most) return nullptr;
+    if (bricks_.load(std::memory_order_relaxed) < most && cells_.load(std::memory_order_relaxed) < 2 * most)
+        return nullptr;
     // What nobody asked for in this generation goes.
     auto out = std::make_shared<BrickField>(exact_, options_);
     out->adopt(*this, {}, now);
@@ -96,7 +98,9 @@ void BrickField::adopt(const BrickField& old, const Box3& changed, uint32_t aske
     for (size_t i = 0; i < size; ++i) {
         Brick* b = old.table_.slots[i].brick.load(std::memory_order_acquire);
         if (b == nullptr) continue;
-        if (asked_since != 0 && (b == far_cell() || old.table_.slots[i].asked.load(std::memory_order_relaxed) < asked_since)) continue;
+        if (asked_since != 0 &&
+            (b == far_cell() || old.table_.slots[i].asked.load(std::memory_order_relaxed) < asked_since))
+            continue;
         const uint64_t key = old.table_.slots[i].key.load(std::memory_order_relaxed);
         const ivec3 c = cell_of(key);
         const vec3 low{float(c.x) * side, float(c.y) * side, float(c.z) * side};
@@ -191,8 +195,7 @@ void BrickField::distances(std::span<const vec3> points, float* out, vec3* gradi
 
 void BrickField::distances(const sdf::Points& points, float* out) const {
     Cursor cursor;
-    for (int i = 0; i < points.count; ++i)
-        out[i] = ask({points.x[i], points.y[i], points.z[i]}, nullptr, cursor);
+    for (int i = 0; i < points.count; ++i) out[i] = ask({points.x[i], points.y[i], points.z[i]}, nullptr, cursor);
 }
 
 }  // namespace kiln::field

@@ -19,8 +19,8 @@
 namespace kiln::field {
 
 struct BrickFieldOptions {
-    float voxel_size = 0.02f;     ///< metres, > 0
-    float near = 0.1f;            ///< metres: cells that may hold a value as small as this have bricks
+    float voxel_size = 0.02f;      ///< metres, > 0
+    float near = 0.1f;             ///< metres: cells that may hold a value as small as this have bricks
     size_t most_bricks = 1 << 16;  ///< kept at a time, 2 KiB each; what is asked beyond is made anew each time
 };
 

@@ -17,7 +17,7 @@ namespace {
 
 // A region goes this far into the air around its part, where that is nearer to it than to the rest: what is left of the field then says no
 // less than half of it near where the part was, more than the distance at which bodies take themselves to touch.
-constexpr float kReach = 0.12f;  // metres
+constexpr float kReach = 0.12f;                  // metres
 constexpr int kLeastReach = 4, kMostReach = 16;  // points
 constexpr ivec3 kNeighbours[6] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 
@@ -220,7 +220,7 @@ std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after
     });
     // Pieces that touched what was taken away, one seed each, by the piece that was taken.
     struct Piece {
-        uint32_t group;               // of `old`
+        uint32_t group;                // of `old`
         std::vector<uint64_t> points;  // found, in order; those before `next` are done
         size_t next = 0;
         bool ended = false, large = false;
@@ -319,7 +319,8 @@ std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after
             const Whole& o = wholes[b];
             if (b == a || o.group != w.group) continue;
             alone = false;
-            largest = largest && !o.large && (o.points.size() < w.points.size() || (o.points.size() == w.points.size() && a < b));
+            largest = largest && !o.large &&
+                      (o.points.size() < w.points.size() || (o.points.size() == w.points.size() && a < b));
         }
         if (alone || largest) continue;
         ivec3 low = point_of(w.points[0]), high = low;

@@ -36,15 +36,16 @@ private:
 
 struct LoosePart {
     std::shared_ptr<const RegionField> region;
-    Box3 box;             ///< of its points, a voxel around it
-    size_t points = 0;    ///< lattice points in it
+    Box3 box;           ///< of its points, a voxel around it
+    size_t points = 0;  ///< lattice points in it
 };
 
 struct LooseOptions {
-    float voxel_size = 0.1f;         ///< of the lattice, metres
-    size_t most_points = 1 << 18;    ///< a part may have
-    size_t most_looked_at = 1 << 22;  ///< lattice points of the change; larger ones (and endless ones) cut nothing loose
-    size_t least_points = 8;         ///< smaller parts are crumbs: they go with the world
+    float voxel_size = 0.1f;       ///< of the lattice, metres
+    size_t most_points = 1 << 18;  ///< a part may have
+    size_t most_looked_at =
+        1 << 22;              ///< lattice points of the change; larger ones (and endless ones) cut nothing loose
+    size_t least_points = 8;  ///< smaller parts are crumbs: they go with the world
 };
 /// The largest of the parts that were one before stays. By place: the part with the least first point first.
 std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after, const Box3& changed,
@@ -58,7 +59,7 @@ public:
         bool adds = false;
         vec3 position{};  ///< of a part
         quat rotation{};
-        Box3 box;         ///< in the world
+        Box3 box;  ///< in the world
     };
     LayeredField(std::shared_ptr<const SdfField> base, std::vector<Layer> layers)
         : base_(std::move(base)), layers_(std::move(layers)) {}
@@ -77,7 +78,8 @@ private:
 /// What of a field lies in a region, in a frame of its own whose origin is at `origin`. Any thread.
 class PartField final : public SdfField {
 public:
-    PartField(std::shared_ptr<const SdfField> base, std::shared_ptr<const SdfField> region, vec3 origin, const Box3& box);
+    PartField(std::shared_ptr<const SdfField> base, std::shared_ptr<const SdfField> region, vec3 origin,
+              const Box3& box);
     float distance(vec3 p) const override;
     float distance(vec3 p, vec3& gradient) const override;
     void distances(const sdf::Points& points, float* out) const override;

@@ -12,9 +12,9 @@ namespace kiln::physics {
 
 struct CharacterSettings {
     float radius = 0.3f;
-    float half_height = 0.55f;    ///< of the capsule's segment
-    float step_height = 0.3f;     ///< what it steps onto, metres
-    float steepest_deg = 50;      ///< of a floor that it stands on
+    float half_height = 0.55f;  ///< of the capsule's segment
+    float step_height = 0.3f;   ///< what it steps onto, metres
+    float steepest_deg = 50;    ///< of a floor that it stands on
     vec3 gravity{0, -9.81f, 0};
 };
 

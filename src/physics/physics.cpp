@@ -26,6 +26,11 @@ bool finite(const Pose& p) {
 bool is_field(const BodyShape& s) { return std::holds_alternative<std::shared_ptr<const SdfShape>>(s); }
 const SdfShape& field_of(const BodyShape& s) { return *std::get<std::shared_ptr<const SdfShape>>(s); }
 
+const Triangles* triangles_of(const BodyShape& s) {
+    const auto* t = std::get_if<std::shared_ptr<const Triangles>>(&s);
+    return t != nullptr ? t->get() : nullptr;
+}
+
 Error refused(const char* what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
 
 std::optional<Error> fault_of(const BodySettings& s) {
@@ -40,7 +45,14 @@ std::optional<Error> fault_of(const BodySettings& s) {
         return refused("a friction, restitution or damping that is not a finite number of 0 or more");
     if (s.motion == Motion::Dynamic && !(std::isfinite(s.density) && s.density > 0))
         return refused("a density that is not a finite number above 0");
-    if (is_field(s.shape)) {
+    if (const Triangles* t = triangles_of(s.shape)) {
+        if (s.motion != Motion::Static) return refused("triangles that is to move: only static bodies may have them");
+        if (t->indices.empty() || t->indices.size() % 3 != 0 || t->solid == nullptr) return refused("no triangles");
+        for (const uint32_t i : t->indices)
+            if (i >= t->vertices.size()) return refused("a triangle of a vertex that there is not");
+        for (const vec3 v : t->vertices)
+            if (!finite(v)) return refused("a vertex that is not finite; write finite numbers");
+    } else if (is_field(s.shape)) {
         if (s.motion != Motion::Static && !field_of(s.shape).moves())
             return refused("a field that cannot move: only static bodies may have it");
     } else {
@@ -70,6 +82,11 @@ MassProperties mass_of(const BodySettings& s) {
 Box3 box_around(vec3 center, float radius) { return Box3{center, center}.inflated(radius); }
 
 }  // namespace
+
+const SdfShape* solid_of(const BodyShape& shape) {
+    if (const Triangles* t = triangles_of(shape)) return t->solid.get();
+    return is_field(shape) ? &field_of(shape) : nullptr;
+}
 
 Result<BodyId> World::add(const BodySettings& settings) {
     if (auto fault = fault_of(settings)) return std::move(*fault);
@@ -142,9 +159,10 @@ void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
 Surface World::surface(uint32_t index, vec3 p_world) const {
     const BodySettings& s = bodies_[index].settings;
     const Surface whole{s.friction, s.restitution};
-    if (s.surfaces.empty() || !is_field(s.shape)) return whole;
+    const SdfShape* solid = solid_of(s.shape);
+    if (s.surfaces.empty() || solid == nullptr) return whole;
     const Pose pose = s.motion == Motion::Static ? s.pose : get(index).pose * inverse(bodies_[index].body_from_mass);
-    const uint32_t number = field_of(s.shape).field().material(inverse(pose) * p_world);
+    const uint32_t number = solid->field().material(inverse(pose) * p_world);
     return number < s.surfaces.size() ? s.surfaces[number] : whole;
 }
 
@@ -214,7 +232,7 @@ template <typename Ask>
 auto World::ask(uint32_t index, Ask&& ask_field) const {
     const BodyShape& shape = bodies_[index].settings.shape;
     const Pose pose = state(id_of(index)).pose;
-    if (is_field(shape)) return ask_field(field_of(shape).field(), pose);
+    if (const SdfShape* solid = solid_of(shape)) return ask_field(solid->field(), pose);
     return ask_field(ConvexField(std::get<Convex>(shape)), pose);
 }
 
@@ -285,8 +303,8 @@ std::vector<BodyId> World::overlap(const SdfShape& shape, const Pose& pose) cons
     for (const uint32_t i : candidates) {
         const BodyShape& other = bodies_[i].settings.shape;
         const Pose shape_from_body = inverse(pose) * state(id_of(i)).pose;
-        if (is_field(other)) {
-            collide(field_of(other), shape, shape_from_body, 0, found);
+        if (const SdfShape* solid = solid_of(other)) {
+            collide(*solid, shape, shape_from_body, 0, found);
         } else {
             collide(shape.field(), std::get<Convex>(other), shape_from_body, 0, found);
         }

@@ -27,8 +27,18 @@ using BodyId = Id<struct BodyTag>;
 
 enum class Motion : uint8_t { Static, Kinematic, Dynamic };
 
-/// Exact convex shapes, or a field.
-using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>>;
+/// Triangles of what stands, wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions
+/// are answered from it.
+struct Triangles {
+    std::vector<vec3> vertices;
+    std::vector<uint32_t> indices;  ///< three a triangle
+    std::shared_ptr<const SdfShape> solid;
+};
+
+/// Exact convex shapes, a field, or triangles.
+using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>, std::shared_ptr<const Triangles>>;
+/// The field, or what the triangles are the surface of; null for convex shapes.
+const SdfShape* solid_of(const BodyShape& shape);
 
 struct Surface {
     float friction = 0.5f, restitution = 0;

@@ -73,10 +73,9 @@ Result<void> Simulation::add(const physics::BodySettings& body, std::string_view
 }
 
 std::shared_ptr<const physics::SdfShape> Simulation::ground_shape(const Box3& changed) {
-    bricks_ = bricks_ != nullptr
-                  ? bricks_->after(ground_, changed)
-                  : std::make_shared<const field::BrickField>(
-                        ground_, field::BrickFieldOptions{.voxel_size = voxel_size_, .near = near_});
+    bricks_ = bricks_ != nullptr ? bricks_->after(ground_, changed)
+                                 : std::make_shared<const field::BrickField>(
+                                       ground_, field::BrickFieldOptions{.voxel_size = voxel_size_, .near = near_});
     return physics::SdfShape::fixed(ground_, bricks_);
 }
 

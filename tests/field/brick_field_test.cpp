@@ -22,7 +22,8 @@ std::vector<Edit> hills() {
     std::mt19937 rng(7);
     const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
     for (int i = 0; i < 40; ++i)
-        out.push_back(edit(Sphere{.radius = uniform(0.4f, 1.5f)}, {uniform(-5, 5), uniform(-0.5f, 0.5f), uniform(-5, 5)},
+        out.push_back(edit(Sphere{.radius = uniform(0.4f, 1.5f)},
+                           {uniform(-5, 5), uniform(-0.5f, 0.5f), uniform(-5, 5)},
                            i % 4 == 0 ? Op::Subtract : Op::Union, 0.3f));
     return out;
 }

@@ -34,7 +34,8 @@ TEST_P(EachTrigger, TellsWhoComesAndGoesOnceEach) {
                 heights.push_back(s.world->state(id).pose.position.y);
             }
         }
-        ASSERT_THAT(told, testing::ElementsAre(TriggerEvent{gate, id, true}, TriggerEvent{gate, id, false})) << as_field;
+        ASSERT_THAT(told, testing::ElementsAre(TriggerEvent{gate, id, true}, TriggerEvent{gate, id, false}))
+            << as_field;
         // In from 3.75 down to 2.25, and a step of 0.13 m.
         EXPECT_GT(heights[0], 3.75f - 0.15f);
         EXPECT_LT(heights[0], 3.76f);
@@ -47,7 +48,8 @@ TEST_P(EachTrigger, FindsBodiesThatAreLargerThanItSleepersAndKinematicOnesButNot
     Scene s(GetParam());
     s.ground({edit(Plane{})});
     const BodyId large = s.add({.shape = ball(2), .pose = {{0, 2, 0}, {}}});
-    const BodyId kinematic = s.add({.shape = Convex::box({0.5f, 0.5f, 0.5f}), .motion = Motion::Kinematic, .pose = {{8, 0.9f, 0}, {}}});
+    const BodyId kinematic =
+        s.add({.shape = Convex::box({0.5f, 0.5f, 0.5f}), .motion = Motion::Kinematic, .pose = {{8, 0.9f, 0}, {}}});
     Triggers triggers;
     const TriggerId inner = triggers.add(ball(0.2f), {{0, 2, 0}, {}});
     const TriggerId both = triggers.add(moving({edit(kiln::Box{.half_extents = {10, 0.5f, 1}})}), {});
@@ -69,7 +71,8 @@ TEST_P(EachTrigger, LeaveIsToldWhenTheBodyOrTheTriggerIsNoMore) {
     Scene s(GetParam(), {0, 0, 0});
     Triggers triggers;
     const TriggerId first = triggers.add(ball(1), {}), second = triggers.add(ball(1), {});
-    const BodyId a = s.add({.shape = Convex::sphere(0.2f)}), b = s.add({.shape = Convex::sphere(0.2f), .pose = {{0.5f, 0, 0}, {}}});
+    const BodyId a = s.add({.shape = Convex::sphere(0.2f)}),
+                 b = s.add({.shape = Convex::sphere(0.2f), .pose = {{0.5f, 0, 0}, {}}});
     const auto step = [&] {
         s.world->step(kStep);
         triggers.update(*s.world);

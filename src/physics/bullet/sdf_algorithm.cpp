@@ -114,18 +114,29 @@ public:
     }
 };
 
+// Two fields, or a field and a mesh, which is met as the solid that it is the surface of.
 class FieldsAlgorithm final : public SdfAlgorithm {
 public:
     using SdfAlgorithm::SdfAlgorithm;
+    struct Side {
+        const SdfShape* sdf;
+        Pose world;
+        uint32_t revision;
+    };
+    static Side side_of(const btCollisionObjectWrapper* w) {
+        const Pose world = to_pose(w->getWorldTransform());
+        if (w->getCollisionShape()->getShapeType() != CUSTOM_CONCAVE_SHAPE_TYPE)
+            return {static_cast<const Triangles*>(w->getCollisionShape()->getUserPointer())->solid.get(), world, 0};
+        const auto& shape = static_cast<const BulletSdfShape&>(*w->getCollisionShape());
+        return {&shape.sdf(), world * inverse(shape.field_from_body()), shape.revision()};
+    }
     void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
                           btManifoldResult* result) override {
-        const auto& shape_a = static_cast<const BulletSdfShape&>(*a->getCollisionShape());
-        const auto& shape_b = static_cast<const BulletSdfShape&>(*b->getCollisionShape());
-        const Pose world_from_a = to_pose(a->getWorldTransform()) * inverse(shape_a.field_from_body());
-        const Pose world_from_b = to_pose(b->getWorldTransform()) * inverse(shape_b.field_from_body());
-        const Pose b_from_a = inverse(world_from_b) * world_from_a;
-        if (as_before(b_from_a, shape_a.revision() + shape_b.revision(), result)) return;
-        collide(shape_a.sdf(), shape_b.sdf(), b_from_a, margin(), contacts_);
+        const Side side_a = side_of(a), side_b = side_of(b);
+        const Pose world_from_b = side_b.world;
+        const Pose b_from_a = inverse(world_from_b) * side_a.world;
+        if (as_before(b_from_a, side_a.revision + side_b.revision, result)) return;
+        collide(*side_a.sdf, *side_b.sdf, b_from_a, margin(), contacts_);
         result->setPersistentManifold(manifold_);
         add(result, world_from_b, false);
     }
@@ -181,6 +192,8 @@ SdfAlgorithms::SdfAlgorithms(btCollisionDispatcher& dispatcher)
         dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, type, swapped_.get());
     }
     dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, CUSTOM_CONCAVE_SHAPE_TYPE, fields_.get());
+    dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, TRIANGLE_MESH_SHAPE_PROXYTYPE, fields_.get());
+    dispatcher.registerCollisionCreateFunc(TRIANGLE_MESH_SHAPE_PROXYTYPE, CUSTOM_CONCAVE_SHAPE_TYPE, fields_.get());
 }
 SdfAlgorithms::~SdfAlgorithms() = default;
 
