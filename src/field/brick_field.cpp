@@ -18,6 +18,7 @@ constexpr int kMostCell = kNearCells - 1;  // beyond, floats of texels are too c
 constexpr uint64_t kUsed = uint64_t(1) << 63;
 constexpr float kHalfDiagonal = 0.8661f;  // of a side
 constexpr size_t kBodyBricks = 1 << 13;
+constexpr size_t kLeastRoom = 1 << 12;  // cells
 
 uint64_t key_of(ivec3 c) {
     const auto part = [](int v) { return uint64_t(uint32_t(v + kNearCells)) & 0xfffff; };
@@ -61,10 +62,14 @@ void BrickField::let_go(Brick* b) {
 }
 
 BrickField::BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options)
+    : BrickField(std::move(exact), options, Room{2 * options.most_bricks}) {}
+
+BrickField::BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options, Room room)
     : exact_(std::move(exact)),
       options_(options),
       voxels_per_metre_(1 / options.voxel_size),
-      table_(4 * options.most_bricks) {}
+      table_(2 * room.cells),
+      room_(room.cells) {}
 
 std::shared_ptr<const BrickField> BrickField::of_body(std::shared_ptr<const SdfField> exact, float most_voxel) {
     const vec3 size = exact->bounds().max - exact->bounds().min;
@@ -74,7 +79,10 @@ std::shared_ptr<const BrickField> BrickField::of_body(std::shared_ptr<const SdfF
 }
 
 std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfField> exact, const Box3& changed) const {
-    auto out = std::make_shared<BrickField>(std::move(exact), options_);
+    // Small, so that an edit costs little; it grows between steps.
+    const size_t room =
+        std::clamp(2 * cells_.load(std::memory_order_relaxed), std::min(kLeastRoom, room_), 2 * options_.most_bricks);
+    auto out = std::make_shared<BrickField>(std::move(exact), options_, Room{room});
     // A value can change only where the change is nearer than the value is large, and bricks hold values up to `near` and a diagonal.
     const float reach = options_.near + 3 * kHalfDiagonal * kBrickVoxels * options_.voxel_size;
     out->adopt(*this, changed.empty() ? changed : changed.inflated(reach), 0);
@@ -84,8 +92,13 @@ std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfFie
 std::shared_ptr<const SdfField> BrickField::renewed() const {
     const uint32_t now = generation_.fetch_add(1, std::memory_order_relaxed);
     const size_t most = options_.most_bricks;
-    if (bricks_.load(std::memory_order_relaxed) < most && cells_.load(std::memory_order_relaxed) < 2 * most)
-        return nullptr;
+    const size_t cells = cells_.load(std::memory_order_relaxed);
+    if (room_ < 2 * most && 2 * cells > room_) {
+        auto larger = std::make_shared<BrickField>(exact_, options_, Room{std::min(4 * room_, 2 * most)});
+        larger->adopt(*this, {}, 0);
+        return larger;
+    }
+    if (bricks_.load(std::memory_order_relaxed) < most && cells < 2 * most) return nullptr;
     // What nobody asked for in this generation goes.
     auto out = std::make_shared<BrickField>(exact_, options_);
     out->adopt(*this, {}, now);
@@ -106,7 +119,7 @@ void BrickField::adopt(const BrickField& old, const Box3& changed, uint32_t aske
         const vec3 low{float(c.x) * side, float(c.y) * side, float(c.z) * side};
         if (!changed.empty() && changed.overlaps({low, low + vec3{side, side, side}})) continue;
         size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> table_.shift);
-        const size_t mask = size - 1;
+        const size_t mask = (size_t(1) << (64 - table_.shift)) - 1;
         while (table_.slots[at].key.load(std::memory_order_relaxed) != 0) at = (at + 1) & mask;
         if (b != far_cell()) {
             b->holders.fetch_add(1, std::memory_order_relaxed);
@@ -140,7 +153,7 @@ const BrickField::Brick* BrickField::find(uint64_t key, ivec3 cell) const {
         uint64_t there = slot.key.load(std::memory_order_relaxed);
         if (there == 0) {
             if (bricks_.load(std::memory_order_relaxed) >= options_.most_bricks ||
-                cells_.load(std::memory_order_relaxed) >= 2 * options_.most_bricks)
+                cells_.load(std::memory_order_relaxed) >= room_)
                 break;
             if (slot.key.compare_exchange_strong(there, key, std::memory_order_relaxed)) {
                 cells_.fetch_add(1, std::memory_order_relaxed);

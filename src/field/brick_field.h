@@ -48,6 +48,15 @@ public:
     size_t brick_count() const { return bricks_.load(std::memory_order_relaxed); }
 
 private:
+    struct Room {
+        size_t cells;
+    };
+
+public:
+    /// Of after() and renewed(), whose tables grow with what is asked.
+    BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options, Room room);
+
+private:
     struct alignas(64) Brick {
         std::atomic<uint32_t> holders{1};  // tables
         std::array<float, kBrickTexelCount> distance;
@@ -85,6 +94,7 @@ private:
     BrickFieldOptions options_;
     float voxels_per_metre_;
     Table table_;
+    size_t room_;  // cells the table takes
     mutable std::atomic<size_t> bricks_ = 0, cells_ = 0;
     mutable std::atomic<uint32_t> generation_ = 1;
 };

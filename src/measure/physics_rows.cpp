@@ -44,7 +44,8 @@ std::vector<Edit> terrain(uint32_t seed) {
     std::vector<Edit> out{placed(Plane{}, {})};
     for (uint32_t i = 0; i < 200; ++i) {
         const auto u = [&](uint32_t k) { return uniform(seed, i, k); };
-        const float radius = 4 + 6 * u(0), rise = 0.3f + 1.2f * u(1), x = kSide * (u(2) - 0.5f), z = kSide * (u(3) - 0.5f);
+        const float radius = 4 + 6 * u(0), rise = 0.3f + 1.2f * u(1), x = kSide * (u(2) - 0.5f),
+                    z = kSide * (u(3) - 0.5f);
         const bool hollow = i % 3 == 0;
         out.push_back(placed(Sphere{.radius = radius}, {x, hollow ? radius - rise : rise - radius, z},
                              hollow ? Op::Subtract : Op::Union, 1));
@@ -74,7 +75,8 @@ Result<Ground> make_ground(std::vector<Edit> edits, float side, float voxel) {
     const auto shared = std::make_shared<const sdf::Program>(std::move(*program));
     out.exact = std::make_shared<const field::ProgramField>(shared);
     const float half = 0.5f * side;
-    const auto host = field::HostBricks::build(shared, {.voxel_size = voxel, .bounds = {{-half, -4, -half}, {half, 4, half}}});
+    const auto host =
+        field::HostBricks::build(shared, {.voxel_size = voxel, .bounds = {{-half, -4, -half}, {half, 4, half}}});
     if (!host) return host.error();
     field::Mesh mesh;
     field::mesh_smooth(field::MeshBricks(*host), mesh);
@@ -95,12 +97,15 @@ struct Ran {
 
 class PhysicsRows {
 public:
-    PhysicsRows(BenchRun& run, std::string_view engine, bool standard) : run_(run), engine_(engine), standard_(standard) {}
+    PhysicsRows(BenchRun& run, std::string_view engine, bool standard)
+        : run_(run), engine_(engine), standard_(standard) {}
 
     void all() {
-        if (run_.wanted("physics", "bodies.1000")) pile("bodies.1000", terrain(run_.options.seed), &PhysicsRows::add_bodies, true);
+        if (run_.wanted("physics", "bodies.1000"))
+            pile("bodies.1000", terrain(run_.options.seed), &PhysicsRows::add_bodies, true);
         if (run_.wanted("physics", "tori.100")) pile("tori.100", {placed(Plane{}, {})}, &PhysicsRows::add_tori, false);
-        if (standard_ && (run_.wanted("physics", "collider.edit") || run_.wanted("physics", "collider.main"))) collider();
+        if (standard_ && (run_.wanted("physics", "collider.edit") || run_.wanted("physics", "collider.main")))
+            collider();
     }
 
 private:
@@ -237,7 +242,8 @@ private:
         uint64_t hash = 0, slow = 0;
         for (int i = 0; i < kEdits; ++i) {
             const float half = 0.5f * kEditCells * kVoxel;
-            const vec3 at{kSide * 0.6f * (uniform(7, uint32_t(i), 0) - 0.5f), 0, kSide * 0.6f * (uniform(7, uint32_t(i), 1) - 0.5f)};
+            const vec3 at{kSide * 0.6f * (uniform(7, uint32_t(i), 0) - 0.5f), 0,
+                          kSide * 0.6f * (uniform(7, uint32_t(i), 1) - 0.5f)};
             edits.push_back(placed(Sphere{.radius = half}, at, Op::Subtract));
             exact = exact_of(edits);
             const Box3 box{at - vec3{half, half, half}, at + vec3{half, half, half}};
@@ -279,7 +285,8 @@ private:
 
 BenchFamily physics_family() {
     return {{"physics",
-             "1000 bodies on a terrain, a pile of 100 tori (fields), a bite of 64 cells a side out of the ground; the first beside triangles of the same ground",
+             "1000 bodies on a terrain, a pile of 100 tori (fields), a bite of 64 cells a side out of the ground; the "
+             "first beside triangles of the same ground",
              {"bodies.1000", "tori.100", "collider.edit", "collider.main"}},
             [](BenchRun& run) {
                 bool standard = true;

@@ -130,4 +130,20 @@ TEST(BrickField, WhatWasNotAskedForLatelyMakesRoom) {
     EXPECT_LT(static_cast<const BrickField&>(*third).brick_count(), 2u);
 }
 
+TEST(BrickField, ASmallTableAfterAnEditGrowsBetweenStepsAndSaysTheSame) {
+    const auto exact = exact_of(hills());
+    const BrickFieldOptions options{.voxel_size = 0.02f, .near = 0.05f};
+    const BrickField first(exact, options);
+    auto field = std::static_pointer_cast<const SdfField>(first.after(exact, {}));
+    const std::vector<vec3> points = some_points(12000, 5, 9);
+    const std::vector<uint32_t> expected = bits_of(first, points);
+    int grown = 0;
+    for (int step = 0; step < 6; ++step) {
+        EXPECT_EQ(bits_of(static_cast<const BrickField&>(*field), points), expected);
+        if (auto next = field->renewed()) field = std::move(next), ++grown;
+    }
+    EXPECT_GE(grown, 1);
+    EXPECT_EQ(static_cast<const BrickField&>(*field).brick_count(), first.brick_count());
+}
+
 }  // namespace

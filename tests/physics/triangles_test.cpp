@@ -24,9 +24,9 @@ constexpr float kCell = 0.2f;
 std::shared_ptr<const Triangles> meshed(const std::vector<Edit>& edits, float reach) {
     const auto exact = field_of(edits);
     auto program = sdf::compile({edits, {}, {}});
-    const auto host = field::HostBricks::build(
-        std::make_shared<const sdf::Program>(std::move(*program)),
-        {.voxel_size = kCell, .bounds = {{-reach, -3, -reach}, {reach, 3, reach}}});
+    const auto host =
+        field::HostBricks::build(std::make_shared<const sdf::Program>(std::move(*program)),
+                                 {.voxel_size = kCell, .bounds = {{-reach, -3, -reach}, {reach, 3, reach}}});
     EXPECT_TRUE(host);
     field::Mesh mesh;
     field::mesh_smooth(field::MeshBricks(*host), mesh);
@@ -38,7 +38,8 @@ std::shared_ptr<const Triangles> meshed(const std::vector<Edit>& edits, float re
 }
 
 TEST_P(OnTriangles, ThingsComeToRestWhereTheyDoOnTheField) {
-    const std::vector<Edit> edits{edit(Plane{}, {0, 0.05f, 0}), edit(kiln::Box{.half_extents = {1.5f, 0.5f, 1.5f}}, {4, 0, 0})};
+    const std::vector<Edit> edits{edit(Plane{}, {0, 0.05f, 0}),
+                                  edit(kiln::Box{.half_extents = {1.5f, 0.5f, 1.5f}}, {4, 0, 0})};
     const auto mesh = meshed(edits, 8);
     for (const bool as_field : {false, true}) {
         for (const Solid& solid : solids()) {
