@@ -20,6 +20,10 @@
 
 namespace kiln {
 
+namespace scene {
+class Simulation;
+}
+
 struct FieldSettings {
     float voxel_size = 0;  ///< metres; 0: longest finite side / 256
     int cells = 64;        ///< a side per level, a power of two (clipmap levels; one level covers the edits)
@@ -210,6 +214,7 @@ public:
 
 private:
     friend class History;
+    friend class scene::Simulation;
     friend struct SceneDifference compare_scenes(const World& a, const World& b);
     std::unique_ptr<Impl> impl_;
 };

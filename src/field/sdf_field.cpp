@@ -2,7 +2,10 @@
 
 #include "field/sdf_field.h"
 
+#include "sdf/prune.h"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace kiln::field {
@@ -11,6 +14,7 @@ namespace {
 
 dvec3 to_double(vec3 p) { return {double(p.x), double(p.y), double(p.z)}; }
 
+constexpr float kHalfDiagonal = 0.867f;          // of a cube of side 1, and room for rounding
 constexpr float kNear = 32, kFloatStep = 2e-3f;  // metres
 
 // Step of the differences, metres: far above double's rounding, far below any detail that a body can feel.
@@ -105,6 +109,31 @@ void ProgramField::distances(std::span<const vec3> points, float* out, vec3* gra
         }
         first += count;
     }
+}
+
+size_t ProgramField::cost() const { return program_->tape().size(); }
+
+bool SdfField::texels(vec3 center, float side, float near, const float* x, const float* y, const float* z,
+                      float* out) const {
+    if (!(std::abs(distance(center)) <= near + kHalfDiagonal * side)) return false;  // 1-Lipschitz
+    std::array<float, 64> xs, ys, zs;
+    for (size_t k = 0; k < 8; ++k) {
+        for (size_t i = 0; i < 64; ++i) xs[i] = x[i & 7], ys[i] = y[i >> 3], zs[i] = z[k];
+        distances({xs.data(), ys.data(), zs.data(), 64}, out + 64 * k);
+    }
+    return true;
+}
+
+bool ProgramField::texels(vec3 center, float side, float near, const float* x, const float* y, const float* z,
+                          float* out) const {
+    thread_local sdf::PruneScratch scratch;
+    thread_local std::vector<sdf::Instruction> code;
+    const float radius = kHalfDiagonal * side;
+    const float value =
+        sdf::prune(regions_.tape_around(to_double(center), 0.5 * double(side)), center, radius, code, scratch);
+    if (!(std::abs(value) <= near + radius)) return false;
+    (void)sdf::evaluate_brick(sdf::view(*program_, code), x, y, z, out);
+    return true;
 }
 
 uint32_t ProgramField::material(vec3 p) const {

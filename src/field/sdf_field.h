@@ -26,10 +26,20 @@ public:
     virtual void distances(std::span<const vec3> points, float* out, vec3* gradients) const;
     /// out[i] = distance at point i; neighbours of the list should be neighbours in space.
     virtual void distances(const sdf::Points& points, float* out) const = 0;
+    /// Values of the 512 texels (x[i], y[j], z[k]), i fastest, of the cube of this side around `center`; false, and nothing written, where
+    /// the value at the centre says that all in it are larger than `near`.
+    virtual bool texels(vec3 center, float side, float near, const float* x, const float* y, const float* z,
+                        float* out) const;
     /// Number of the heaviest material (sdf::material_number); of a surface where none is said, sdf::kDefaultMaterial.
     virtual uint32_t material(vec3) const { return sdf::kDefaultMaterial; }
     /// Holds the solid; infinite faces where it has no end there, empty when there is none.
     virtual Box3 bounds() const = 0;
+    /// About how many instructions a question costs.
+    virtual size_t cost() const { return 1; }
+    /// How far values may lie above or below the solid's, metres: where they are interpolated.
+    virtual float error() const { return 0; }
+    /// Between steps: what is to answer from now on, where this one keeps more than it may; null: this one.
+    virtual std::shared_ptr<const SdfField> renewed() const { return nullptr; }
 };
 
 /// The exact value of a compiled program. A question costs the edits around it (sdf/regions.h).
@@ -41,8 +51,11 @@ public:
     float distance(vec3 p, vec3& gradient) const override;
     void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
     void distances(const sdf::Points& points, float* out) const override;
+    bool texels(vec3 center, float side, float near, const float* x, const float* y, const float* z,
+                float* out) const override;
     uint32_t material(vec3 p) const override;
     Box3 bounds() const override { return bounds_; }
+    size_t cost() const override;
     const sdf::Program& program() const { return *program_; }
 
 private:

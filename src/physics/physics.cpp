@@ -12,7 +12,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
+#include <tuple>
 
 namespace kiln::physics {
 
@@ -25,6 +25,11 @@ bool finite(const Pose& p) {
 }
 bool is_field(const BodyShape& s) { return std::holds_alternative<std::shared_ptr<const SdfShape>>(s); }
 const SdfShape& field_of(const BodyShape& s) { return *std::get<std::shared_ptr<const SdfShape>>(s); }
+
+const Triangles* triangles_of(const BodyShape& s) {
+    const auto* t = std::get_if<std::shared_ptr<const Triangles>>(&s);
+    return t != nullptr ? t->get() : nullptr;
+}
 
 Error refused(const char* what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
 
@@ -40,7 +45,14 @@ std::optional<Error> fault_of(const BodySettings& s) {
         return refused("a friction, restitution or damping that is not a finite number of 0 or more");
     if (s.motion == Motion::Dynamic && !(std::isfinite(s.density) && s.density > 0))
         return refused("a density that is not a finite number above 0");
-    if (is_field(s.shape)) {
+    if (const Triangles* t = triangles_of(s.shape)) {
+        if (s.motion != Motion::Static) return refused("triangles that is to move: only static bodies may have them");
+        if (t->indices.empty() || t->indices.size() % 3 != 0 || t->solid == nullptr) return refused("no triangles");
+        for (const uint32_t i : t->indices)
+            if (i >= t->vertices.size()) return refused("a triangle of a vertex that there is not");
+        for (const vec3 v : t->vertices)
+            if (!finite(v)) return refused("a vertex that is not finite; write finite numbers");
+    } else if (is_field(s.shape)) {
         if (s.motion != Motion::Static && !field_of(s.shape).moves())
             return refused("a field that cannot move: only static bodies may have it");
     } else {
@@ -70,6 +82,11 @@ MassProperties mass_of(const BodySettings& s) {
 Box3 box_around(vec3 center, float radius) { return Box3{center, center}.inflated(radius); }
 
 }  // namespace
+
+const SdfShape* solid_of(const BodyShape& shape) {
+    if (const Triangles* t = triangles_of(shape)) return t->solid.get();
+    return is_field(shape) ? &field_of(shape) : nullptr;
+}
 
 Result<BodyId> World::add(const BodySettings& settings) {
     if (auto fault = fault_of(settings)) return std::move(*fault);
@@ -142,9 +159,10 @@ void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
 Surface World::surface(uint32_t index, vec3 p_world) const {
     const BodySettings& s = bodies_[index].settings;
     const Surface whole{s.friction, s.restitution};
-    if (s.surfaces.empty() || !is_field(s.shape)) return whole;
+    const SdfShape* solid = solid_of(s.shape);
+    if (s.surfaces.empty() || solid == nullptr) return whole;
     const Pose pose = s.motion == Motion::Static ? s.pose : get(index).pose * inverse(bodies_[index].body_from_mass);
-    const uint32_t number = field_of(s.shape).field().material(inverse(pose) * p_world);
+    const uint32_t number = solid->field().material(inverse(pose) * p_world);
     return number < s.surfaces.size() ? s.surfaces[number] : whole;
 }
 
@@ -175,17 +193,25 @@ void World::step(float seconds) {
         push(i, {}, {});
         ++lost_;
     }
+    for (uint32_t i = 0; i < bodies_.size(); ++i) {
+        Body& b = bodies_[i];
+        if (!b.live || b.settings.motion != Motion::Static || !is_field(b.settings.shape)) continue;
+        if (auto next = field_of(b.settings.shape).renewed()) {
+            b.settings.shape = next;
+            swap(i, std::move(next));
+        }
+    }
     pairs_.clear();
     collect(pairs_);
-    std::map<std::pair<BodyId, BodyId>, float> now;
-    for (const Pair& p : pairs_) {
-        auto [at, fresh] = now.try_emplace({id_of(p.a), id_of(p.b)}, p.depth);
-        if (!fresh) at->second = std::max(at->second, p.depth);
-    }
+    std::sort(pairs_.begin(), pairs_.end(),
+              [](const Pair& p, const Pair& q) { return std::tie(p.a, p.b, q.depth) < std::tie(q.a, q.b, p.depth); });
     events_.clear();
-    std::vector<Touch> touches;
-    touches.reserve(now.size());
-    for (const auto& [key, depth] : now) touches.push_back({key.first, key.second, depth});
+    std::vector<Touch>& touches = touches_before_;  // what is of no more use
+    touches.clear();
+    for (const Pair& p : pairs_) {
+        const Touch t{id_of(p.a), id_of(p.b), p.depth};
+        if (touches.empty() || touches.back().a != t.a || touches.back().b != t.b) touches.push_back(t);
+    }
     // Both lists ascend: what is in one only has begun or ended.
     const auto less = [](const Touch& p, const Touch& q) { return std::pair(p.a, p.b) < std::pair(q.a, q.b); };
     auto before = touches_.begin();
@@ -198,7 +224,7 @@ void World::step(float seconds) {
         }
     }
     for (; before != touches_.end(); ++before) events_.push_back({before->a, before->b, false});
-    touches_ = std::move(touches);
+    touches_.swap(touches);
 }
 
 // Convex bodies have distances in closed form, so that questions are the same on every engine, and the same as those of fields.
@@ -206,7 +232,7 @@ template <typename Ask>
 auto World::ask(uint32_t index, Ask&& ask_field) const {
     const BodyShape& shape = bodies_[index].settings.shape;
     const Pose pose = state(id_of(index)).pose;
-    if (is_field(shape)) return ask_field(field_of(shape).field(), pose);
+    if (const SdfShape* solid = solid_of(shape)) return ask_field(solid->field(), pose);
     return ask_field(ConvexField(std::get<Convex>(shape)), pose);
 }
 
@@ -227,9 +253,9 @@ std::optional<BodyHit> World::first_hit(const Box3& box, BodyId but, Ask&& cast)
     return best;
 }
 
-std::optional<BodyHit> World::cast_ray(vec3 origin, vec3 way) const {
+std::optional<BodyHit> World::cast_ray(vec3 origin, vec3 way, BodyId but) const {
     const vec3 end = origin + way;
-    return first_hit({min(origin, end), max(origin, end)}, {}, [&](const auto& field, const Pose& local, float most) {
+    return first_hit({min(origin, end), max(origin, end)}, but, [&](const auto& field, const Pose& local, float most) {
         return physics::cast_ray(field, local * origin, rotate(local.rotation, way), most);
     });
 }
@@ -242,19 +268,61 @@ std::optional<BodyHit> World::sweep(const Convex& shape, const Pose& pose, vec3 
     });
 }
 
-std::vector<BodyId> World::overlap(const Convex& shape, const Pose& pose) const {
+std::vector<BodyContact> World::contacts(const Convex& shape, const Pose& pose, float margin, BodyId but) const {
     std::vector<uint32_t> candidates;
-    near(box_around(pose.position, outer_radius(shape)), candidates);
+    near(box_around(pose.position, outer_radius(shape) + margin), candidates);
     std::sort(candidates.begin(), candidates.end());
-    std::vector<BodyId> out;
-    std::vector<FieldContact> contacts;
+    std::vector<BodyContact> out;
+    std::vector<FieldContact> found;
     for (const uint32_t i : candidates) {
+        if (id_of(i) == but) continue;
         ask(i, [&](const field::SdfField& field, const Pose& world) {
-            collide(field, shape, inverse(world) * pose, 0, contacts);
-            if (!contacts.empty()) out.push_back(id_of(i));
+            collide(field, shape, inverse(world) * pose, margin, found);
+            for (const FieldContact& c : found)
+                out.push_back({id_of(i), world * c.point, rotate(world.rotation, c.normal), c.depth});
         });
     }
     return out;
+}
+
+std::vector<BodyId> World::overlap(const Convex& shape, const Pose& pose) const {
+    std::vector<BodyId> out;
+    for (const BodyContact& c : contacts(shape, pose, 0))
+        if (out.empty() || out.back() != c.body) out.push_back(c.body);
+    return out;
+}
+
+std::vector<BodyId> World::overlap(const SdfShape& shape, const Pose& pose) const {
+    const Box3& box = shape.bounds();
+    const float radius = box.finite() ? length(box.half_extents()) : 0;
+    std::vector<uint32_t> candidates;
+    near(box.finite() ? box_around(pose * box.center(), radius) : box, candidates);
+    std::sort(candidates.begin(), candidates.end());
+    std::vector<BodyId> out;
+    std::vector<FieldContact> found;
+    for (const uint32_t i : candidates) {
+        const BodyShape& other = bodies_[i].settings.shape;
+        const Pose shape_from_body = inverse(pose) * state(id_of(i)).pose;
+        if (const SdfShape* solid = solid_of(other)) {
+            collide(*solid, shape, shape_from_body, 0, found);
+        } else {
+            collide(shape.field(), std::get<Convex>(other), shape_from_body, 0, found);
+        }
+        if (!found.empty()) out.push_back(id_of(i));
+    }
+    return out;
+}
+
+vec3 World::velocity_at(BodyId id, vec3 p_world) const {
+    const Body* b = find(id);
+    if (b == nullptr || b->settings.motion == Motion::Static) return {};
+    const BodyState s = get(id.index);
+    return s.linear_velocity + cross(s.angular_velocity, p_world - s.pose.position);
+}
+
+Motion World::motion(BodyId id) const {
+    const Body* b = find(id);
+    return b != nullptr ? b->settings.motion : Motion::Static;
 }
 
 std::span<const Backend> backends() {

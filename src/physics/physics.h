@@ -27,8 +27,18 @@ using BodyId = Id<struct BodyTag>;
 
 enum class Motion : uint8_t { Static, Kinematic, Dynamic };
 
-/// Exact convex shapes, or a field.
-using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>>;
+/// Triangles of what stands, wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions
+/// are answered from it.
+struct Triangles {
+    std::vector<vec3> vertices;
+    std::vector<uint32_t> indices;  ///< three a triangle
+    std::shared_ptr<const SdfShape> solid;
+};
+
+/// Exact convex shapes, a field, or triangles.
+using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>, std::shared_ptr<const Triangles>>;
+/// The field, or what the triangles are the surface of; null for convex shapes.
+const SdfShape* solid_of(const BodyShape& shape);
 
 struct Surface {
     float friction = 0.5f, restitution = 0;
@@ -57,6 +67,13 @@ struct BodyHit {
     float fraction = 0;  ///< of the way
     vec3 position;       ///< where they touch
     vec3 normal;         ///< unit, out of the body that was hit
+};
+
+struct BodyContact {
+    BodyId body;
+    vec3 position;    ///< on the shape that was asked for
+    vec3 normal;      ///< unit, out of the body
+    float depth = 0;  ///< metres; negative where they are apart
 };
 
 /// Two bodies began to touch, or ceased to; a has the lower index.
@@ -112,11 +129,17 @@ public:
     std::span<const Touch> touches() const { return touches_; }
 
     /// First body on the way from `origin` to origin + way.
-    std::optional<BodyHit> cast_ray(vec3 origin, vec3 way) const;
+    std::optional<BodyHit> cast_ray(vec3 origin, vec3 way, BodyId but = {}) const;
     /// First body that `shape` meets on its way, not turning.
     std::optional<BodyHit> sweep(const Convex& shape, const Pose& pose, vec3 way, BodyId but = {}) const;
     /// Bodies that share a point with the shape, ascending.
     std::vector<BodyId> overlap(const Convex& shape, const Pose& pose) const;
+    std::vector<BodyId> overlap(const SdfShape& shape, const Pose& pose) const;
+    /// Where a shape would touch bodies, no farther apart than `margin`; by body, the deepest of each place first.
+    std::vector<BodyContact> contacts(const Convex& shape, const Pose& pose, float margin, BodyId but = {}) const;
+    /// Of the point of a body that is at p_world now.
+    vec3 velocity_at(BodyId id, vec3 p_world) const;
+    Motion motion(BodyId id) const;
 
 protected:
     struct Body {
@@ -159,7 +182,7 @@ private:
     BodyId id_of(uint32_t index) const { return {index, bodies_[index].generation}; }
     std::vector<Body> bodies_;
     std::vector<uint32_t> free_;
-    std::vector<Touch> touches_;
+    std::vector<Touch> touches_, touches_before_;
     std::vector<ContactEvent> events_;
     std::vector<Pair> pairs_;
     size_t count_ = 0;

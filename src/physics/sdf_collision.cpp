@@ -17,6 +17,7 @@ constexpr float kAlike =
     0.9f;  // cosine: starts that the field faces so like a place already found lead there, after kSure descents
 constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
+constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
 constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
 constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
@@ -183,50 +184,146 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
     }
 }
 
+namespace {
+
+// Contacts that were found on interpolated values, as the exact field has them. Those farther apart than the margin go.
+void measure(const field::SdfField& exact, float margin, std::vector<FieldContact>& contacts) {
+    std::array<vec3, kMostContacts> p, g;
+    std::array<float, kMostContacts> d;
+    const size_t count = contacts.size();
+    for (size_t i = 0; i < count; ++i) p[i] = contacts[i].point;
+    exact.distances(std::span(p.data(), count), d.data(), g.data());
+    for (size_t i = 0; i < count; ++i) {
+        const Probe at = probe(p[i], d[i], g[i], contacts[i].normal);
+        contacts[i] = {at.p, at.normal, std::min(at.depth, kMostDepth)};
+    }
+    std::erase_if(contacts, [&](const FieldContact& c) { return !(c.depth > -margin); });
+}
+
+}  // namespace
+
+void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_body, float margin,
+             std::vector<FieldContact>& out) {
+    collide(shape.bricks(), body, shape_from_body, margin + shape.bricks().error(), out);
+    if (&shape.bricks() != &shape.field() && !out.empty()) measure(shape.field(), margin, out);
+}
+
+namespace {
+
+// A surface point of one of two shapes that may be in touch.
+struct Seed {
+    vec3 p;  // in the other's field
+    float distance;
+};
+
+// The lowest points of groups of `shell` that come within reach of `other`, spread over where they touch: from each of them contacts are
+// looked for. `few` is how many there may be.
+void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_from_shell, float reach, size_t few,
+                std::vector<Seed>& out) {
+    std::array<float, 64> x, y, z, d;
+    out.clear();
+    const Box3 box = other.bounds().inflated(reach);
+    for (const SdfShape::Group& g : shell.groups()) {
+        const vec3 center = other_from_shell * g.center;
+        if (!box.inflated(g.radius).contains(center) || other.bricks().distance(center) > g.radius + reach) continue;
+        for (int i = 0; i < g.count; ++i) {
+            const vec3 p = other_from_shell * shell.point(g.first + i);
+            x[size_t(i)] = p.x, y[size_t(i)] = p.y, z[size_t(i)] = p.z;
+        }
+        other.bricks().distances({x.data(), y.data(), z.data(), g.count}, d.data());
+        const size_t low = size_t(std::min_element(d.begin(), d.begin() + g.count) - d.begin());
+        if (d[low] < reach) out.push_back({{x[low], y[low], z[low]}, d[low]});
+    }
+    if (out.size() <= few) return;
+    // The deepest, and then those farthest from all that were taken.
+    std::iter_swap(out.begin(), std::min_element(out.begin(), out.end(),
+                                                 [](const Seed& a, const Seed& b) { return a.distance < b.distance; }));
+    for (size_t taken = 1; taken < few; ++taken) {
+        size_t best = taken;
+        float farthest = -1;
+        for (size_t i = taken; i < out.size(); ++i) {
+            float nearest = std::numeric_limits<float>::infinity();
+            for (size_t k = 0; k < taken; ++k) {
+                const vec3 between = out[i].p - out[k].p;
+                nearest = std::min(nearest, dot(between, between));
+            }
+            if (nearest > farthest) farthest = nearest, best = i;
+        }
+        std::swap(out[taken], out[best]);
+    }
+    out.resize(few);
+}
+
+}  // namespace
+
 void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float margin, std::vector<FieldContact>& out) {
     out.clear();
     struct Candidate {
         FieldContact contact;
         bool of_a;
     };
-    std::vector<Candidate> found;
-    std::array<float, 64> x, y, z, d;
-    // Points of `shell` in `other`'s field, walked along shell's own surface to where they are deepest.
+    thread_local std::vector<Candidate> found;
+    thread_local std::vector<Seed> seeds;
+    thread_local std::vector<FieldContact> met;
+    found.clear();
+    // Seeds of `shell` in `other`'s field, walked along shell's own surface to where they are deepest.
     const auto gather = [&](const SdfShape& shell, const SdfShape& other, const Pose& other_from_shell, bool of_a) {
         const Pose shell_from_other = inverse(other_from_shell);
-        const float reach = margin + 0.5f * shell.spacing();
-        for (const SdfShape::Group& g : shell.groups()) {
-            if (other.field().distance(other_from_shell * g.center) > g.radius + reach) continue;
-            for (int i = 0; i < g.count; ++i) {
-                const vec3 p = other_from_shell * shell.point(g.first + i);
-                x[size_t(i)] = p.x, y[size_t(i)] = p.y, z[size_t(i)] = p.z;
+        // What a field itself says needs no second look.
+        const bool exact = &other.slope() == &other.field();
+        const float reach = margin + (exact ? 0 : other.bricks().error());
+        find_seeds(shell, other, other_from_shell, margin + other.bricks().error() + 0.5f * shell.spacing(), kMostSeeds,
+                   seeds);
+        met.clear();
+        const size_t count = seeds.size();
+        std::array<vec3, kMostSeeds> at, local, slope;
+        std::array<float, kMostSeeds> value, step, off;  // off: from the shell's surface, before the last correction
+        std::array<Probe, kMostSeeds> now;
+        std::array<size_t, kMostSeeds> going;  // numbers of the seeds that still walk
+        size_t walking = count;
+        const auto look = [&](const field::SdfField& field, const std::array<vec3, kMostSeeds>& points, size_t n) {
+            field.distances(std::span(points.data(), n), value.data(), slope.data());
+        };
+        for (size_t i = 0; i < count; ++i) at[i] = seeds[i].p;
+        look(other.slope(), at, count);
+        for (size_t i = 0; i < count; ++i) {
+            now[i] = probe(at[i], value[i], slope[i], {0, 1, 0});
+            step[i] = 2 * float(shell.inner_radius());
+            going[i] = i;
+        }
+        for (int round = 0; round < kShellSteps && walking > 0; ++round) {
+            // Down the other field, then back onto the shell's surface.
+            for (size_t k = 0; k < walking; ++k) {
+                const Probe& p = now[going[k]];
+                local[k] = shell_from_other * (p.p - p.normal * step[going[k]]);
             }
-            other.field().distances({x.data(), y.data(), z.data(), g.count}, d.data());
-            int lowest = 0;
-            for (int i = 1; i < g.count; ++i)
-                if (d[size_t(i)] < d[size_t(lowest)]) lowest = i;
-            if (!(d[size_t(lowest)] < reach)) continue;
-            Probe now = probe(other.field(), {x[size_t(lowest)], y[size_t(lowest)], z[size_t(lowest)]}, {0, 1, 0});
-            float step = 2 * float(shell.inner_radius());
-            for (int i = 0; i < kShellSteps; ++i) {
-                // Down the other field, then back onto the shell's surface.
-                vec3 local = shell_from_other * (now.p - now.normal * step);
-                for (int back = 0; back < 2; ++back) {
-                    vec3 n;
-                    const float value = shell.field().distance(local, n);
-                    const float slope2 = dot(n, n);
-                    if (slope2 > 1e-6f) local = local - n * (value / std::max(slope2, kLeastSlope));
-                }
-                const Probe there = probe(other.field(), other_from_shell * local, now.normal);
-                const float gain = there.depth - now.depth;
-                if (gain > 0) now = there;
-                if (std::abs(gain) < 1e-3f * shell.spacing()) break;
-                if (gain < 0) {
-                    step *= 0.3f;
+            for (int back = 0; back < 2; ++back) {
+                look(shell.slope(), local, walking);
+                for (size_t k = 0; k < walking; ++k) {
+                    off[k] = std::abs(value[k]);
+                    const float slope2 = dot(slope[k], slope[k]);
+                    if (slope2 > 1e-6f) local[k] = local[k] - slope[k] * (value[k] / std::max(slope2, kLeastSlope));
                 }
             }
-            if (!(now.depth > -margin)) continue;
-            FieldContact c{now.p, now.normal, std::min(now.depth, kMostDepth)};
+            for (size_t k = 0; k < walking; ++k) at[k] = other_from_shell * local[k];
+            look(other.slope(), at, walking);
+            size_t still = 0;
+            for (size_t k = 0; k < walking; ++k) {
+                const size_t i = going[k];
+                const Probe there = probe(at[k], value[k], slope[k], now[i].normal);
+                // Where values are mere bounds, a long step may not find back.
+                const bool found_back = off[k] < 0.5f * shell.spacing();
+                const float gain = found_back ? there.depth - now[i].depth : -shell.spacing();
+                if (gain > 0) now[i] = there;
+                if (gain < 0) step[i] *= 0.3f;
+                if (!(std::abs(gain) < 1e-3f * shell.spacing())) going[still++] = i;
+            }
+            walking = still;
+        }
+        for (size_t i = 0; i < count; ++i)
+            if (now[i].depth > -reach) met.push_back({now[i].p, now[i].normal, std::min(now[i].depth, kMostDepth)});
+        if (!exact && !met.empty()) measure(other.field(), margin, met);
+        for (FieldContact c : met) {
             if (!of_a) {
                 // From a's frame to b's. The point was on b; what is asked for is the point of a opposite to it.
                 c = {b_from_a * (c.point + c.normal * c.depth), -rotate(b_from_a.rotation, c.normal), c.depth};

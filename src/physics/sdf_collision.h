@@ -31,6 +31,11 @@ inline constexpr size_t kMostContacts = 24;
 void collide(const field::SdfField& field, const Convex& body, const Pose& field_from_body, float margin,
              std::vector<FieldContact>& out);
 
+/// The same of a shape: contacts are looked for on its bricks, then measured on its field, so that neither a voxel's facets nor its rounding
+/// of edges is felt.
+void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_body, float margin,
+             std::vector<FieldContact>& out);
+
 /// Of two shapes with surface points (a world without them may be `b`): in b's frame, points on a's surface for contacts from a's
 /// points and on b's for b's; normals out of b's solid. At most kMostContacts, no two at one place.
 void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float margin, std::vector<FieldContact>& out);

@@ -18,6 +18,7 @@ constexpr int kMassCells = 96;  // along the longest side: the volume of a ball 
 constexpr int kPoints = 1024;   // of a surface, about; a torus then has one every twelfth of its ring's thickness
 constexpr int kGroup = 24;
 constexpr int kBlock = 8;
+constexpr size_t kShort = 32;  // instructions: nine points with gradients then cost what they do from bricks
 
 float longest(vec3 v) { return std::max({v.x, v.y, v.z}); }
 
@@ -115,14 +116,30 @@ MassProperties principal(double mass, vec3 center, const double (&inertia)[6]) {
     return {mass, center, from_columns(v), {a[0][0], a[1][1], a[2][2]}};
 }
 
-std::shared_ptr<const SdfShape> SdfShape::fixed(std::shared_ptr<const field::SdfField> field) {
+std::shared_ptr<const SdfShape> SdfShape::fixed(std::shared_ptr<const field::SdfField> field,
+                                                std::shared_ptr<const field::SdfField> bricks) {
     std::shared_ptr<SdfShape> out(new SdfShape);
     out->bounds_ = field->bounds();
-    out->field_ = std::move(field);
+    out->take(std::move(field), std::move(bricks));
     return out;
 }
 
-Result<std::shared_ptr<const SdfShape>> SdfShape::moving(std::shared_ptr<const field::SdfField> field) {
+void SdfShape::take(std::shared_ptr<const field::SdfField> field, std::shared_ptr<const field::SdfField> bricks) {
+    field_ = std::move(field);
+    bricks_ = bricks != nullptr ? std::move(bricks) : field_;
+    slope_ = field_->cost() <= kShort ? field_.get() : bricks_.get();
+}
+
+std::shared_ptr<const SdfShape> SdfShape::renewed() const {
+    auto bricks = bricks_->renewed();
+    if (bricks == nullptr) return nullptr;
+    std::shared_ptr<SdfShape> out(new SdfShape(*this));
+    out->take(out->field_, std::move(bricks));
+    return out;
+}
+
+Result<std::shared_ptr<const SdfShape>> SdfShape::moving(std::shared_ptr<const field::SdfField> field,
+                                                         std::shared_ptr<const field::SdfField> bricks) {
     const Box3 box = field->bounds();
     if (box.empty()) return Error{"a body of no volume: nothing in it is solid", ErrorKind::Input};
     if (!box.finite()) return Error{"a body without end: give it edits of finite size", ErrorKind::Input};
@@ -162,7 +179,7 @@ Result<std::shared_ptr<const SdfShape>> SdfShape::moving(std::shared_ptr<const f
     out->mass_ = principal(mass, middle + vec3{float(cx), float(cy), float(cz)}, inertia);
     out->bounds_ = box;
     out->inner_radius_ = double(s.depth);
-    out->field_ = std::move(field);
+    out->take(std::move(field), std::move(bricks));
     out->sample_surface();
     if (out->groups_.empty()) return Error{"a body of no volume: its surface was not found", ErrorKind::Input};
     return std::shared_ptr<const SdfShape>(std::move(out));

@@ -23,12 +23,22 @@ MassProperties principal(double mass, vec3 center, const double (&inertia)[6]);
 
 class SdfShape {
 public:
-    /// Of a world that never moves.
-    static std::shared_ptr<const SdfShape> fixed(std::shared_ptr<const field::SdfField> field);
+    /// Of a world that never moves. `bricks`: the same solid for contacts to be found on, within a quarter of a voxel of `field`
+    /// (field::BrickField); null: `field` itself.
+    static std::shared_ptr<const SdfShape> fixed(std::shared_ptr<const field::SdfField> field,
+                                                 std::shared_ptr<const field::SdfField> bricks = nullptr);
     /// Of a body. Fails when the solid has no volume, or no end. Integrates and samples: milliseconds.
-    static Result<std::shared_ptr<const SdfShape>> moving(std::shared_ptr<const field::SdfField> field);
+    static Result<std::shared_ptr<const SdfShape>> moving(std::shared_ptr<const field::SdfField> field,
+                                                          std::shared_ptr<const field::SdfField> bricks = nullptr);
+    /// The same with bricks(): null where they need no renewal (SdfField::renewed()).
+    std::shared_ptr<const SdfShape> renewed() const;
 
+    /// What questions and casts are answered from.
     const field::SdfField& field() const { return *field_; }
+    /// What contacts are found on.
+    const field::SdfField& bricks() const { return *bricks_; }
+    /// What a walk down the surface is led by: the field where it is short, which then costs no more than its bricks and has no facets.
+    const field::SdfField& slope() const { return *slope_; }
     Box3 bounds() const { return bounds_; }
     bool moves() const { return !groups_.empty(); }
     /// For a density of 1 kg/m³.
@@ -50,8 +60,10 @@ public:
 
 private:
     SdfShape() = default;
+    void take(std::shared_ptr<const field::SdfField> field, std::shared_ptr<const field::SdfField> bricks);
     void sample_surface();
-    std::shared_ptr<const field::SdfField> field_;
+    std::shared_ptr<const field::SdfField> field_, bricks_;
+    const field::SdfField* slope_ = nullptr;  // one of them
     Box3 bounds_;
     MassProperties mass_;
     double inner_radius_ = 0;

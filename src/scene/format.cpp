@@ -180,7 +180,7 @@ constexpr KeyRow kBodyRows[] = {
 constexpr KeyRow kTriggerRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
     needed(plain("object", KeyType::Text, "name of the object that is its region")),
-    numbers("position", 3, kKept, {0, 0, 0}, "m", "any", "of the object's origin"),
+    numbers("position", 3, KILN_AT(Transform, position), {0, 0, 0}, "m", "any", "of the object's origin"),
     plain("rotation", KeyType::Rotation, "quaternion [x, y, z, w]"),
     plain("scale", KeyType::Scale, "a number or three, > 0"),
 };

@@ -238,9 +238,17 @@ private:
         }
         if (const auto at = section("triggers")) {
             for (uint32_t i = 0; i < scene_.objects.size(); ++i) object_names.emplace(scene_.objects[i].name, i);
-            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c))
-                if (const JsonIndex o = *doc_.find(c, "object"); !object_names.contains(doc_.text(o)))
-                    return in_.unknown_name(o, "object", known(object_names));
+            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+                const JsonIndex o = *doc_.find(c, "object");
+                const auto object = object_names.find(doc_.text(o));
+                if (object == object_names.end()) return in_.unknown_name(o, "object", known(object_names));
+                SceneTrigger trigger{std::string(doc_.text(*doc_.find(c, "id"))), {object->second, 0}, {}, c};
+                if (!in_.table(c, kTriggerTable, &trigger.transform.position.x)) return false;
+                if (const auto r = doc_.find(c, "rotation"); r && !in_.rotation(*r, &trigger.transform.rotation))
+                    return false;
+                if (const auto s = doc_.find(c, "scale"); s && !in_.scale(*s, &trigger.transform.scale)) return false;
+                scene_.triggers.push_back(std::move(trigger));
+            }
         }
         return true;
     }

@@ -46,6 +46,14 @@ struct SceneBody {
     JsonIndex place = 0;
 };
 
+/// An entry of "triggers".
+struct SceneTrigger {
+    std::string id;
+    ObjectId object;
+    Transform transform;
+    JsonIndex place = 0;
+};
+
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
 /// sections that the engine does not act on yet, and how it wrote what has two forms.
 struct SceneData {
@@ -72,6 +80,7 @@ struct SceneData {
     NameNumbers material_numbers, object_numbers;
     ScenePhysics physics;
     std::vector<SceneBody> bodies;
+    std::vector<SceneTrigger> triggers;
 
     // Where things stand in `source`; kNowhere for what was added later.
     static constexpr JsonIndex kNowhere = UINT32_MAX;

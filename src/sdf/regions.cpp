@@ -84,6 +84,22 @@ const Regions::Node* Regions::leaf(dvec3 p) const {
     }
 }
 
+TapeView Regions::tape_around(dvec3 center, double half) const {
+    const auto holds = [&](const Node& n) {
+        return std::abs(center.x - n.center.x) + half <= n.half && std::abs(center.y - n.center.y) + half <= n.half &&
+               std::abs(center.z - n.center.z) + half <= n.half;
+    };
+    if (!holds(root_)) return view(program_);
+    const Node* node = &root_;
+    while (true) {
+        const int octant = (center.x > node->center.x ? 1 : 0) | (center.y > node->center.y ? 2 : 0) |
+                           (center.z > node->center.z ? 4 : 0);
+        const Node* next = child(*node, octant);
+        if (next == nullptr || !holds(*next)) return view(program_, node->code);
+        node = next;
+    }
+}
+
 TapeView Regions::tape(dvec3 p, Cursor& cursor) const {
     if (cursor == nullptr || !cursor->contains(p)) cursor = leaf(p);
     return cursor != nullptr ? view(program_, cursor->code) : view(program_);

@@ -40,6 +40,8 @@ public:
     const Node* child(const Node& node, int octant) const;
     /// The smallest region that holds p; null outside the root, where the whole program is right.
     const Node* leaf(dvec3 p) const;
+    /// Code that is right in all of a cube.
+    TapeView tape_around(dvec3 center, double half) const;
 
     /// Where a question was asked last: the next one is likely to be near.
     using Cursor = const Node*;

@@ -240,4 +240,82 @@ TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
     EXPECT_THAT(message(kTumble, {.every = -1}), HasSubstr("0 or more"));
 }
 
+// A pillar on the ground, cut through; its upper part leans over nothing and falls straight.
+constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
+  "edits": [
+    {"id": "ground", "shape": "plane"},
+    {"id": "pillar", "shape": "box", "half_extents": [0.3, 2, 0.3], "position": [0, 1.5, 0]},
+    {"id": "ball", "shape": "sphere", "radius": 0.2, "position": [5, 0.2, 0]}],
+  "bodies": [{"id": "b", "edits": ["ball"]}]})";
+const std::vector<TimedCommand> kCut = {
+    {0.5, "cut",
+     R"({"time": 0.5, "command": {"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}}})",
+     1}};
+
+TEST(Simulate, APartCutLooseBecomesABodyThatFallsAndComesToRest) {
+    const World world = parsed(kPillar);
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 4, .backend = engine, .edits = kCut});
+        ASSERT_EQ(out["bodies"].size(), 2u) << engine;
+        EXPECT_EQ(out["bodies"][1]["id"], "part1");
+        // 0.6 x 1.5 x 0.6 m of 1000 kg/m3.
+        EXPECT_NEAR(out["bodies"][1]["mass"].get<double>(), 540, 15);
+        EXPECT_EQ(out["frames"][30]["bodies"].size(), 1u);
+        const auto part = [&](size_t frame) { return body(out["frames"][frame], "part1"); };
+        EXPECT_NEAR(part(31)["linear_velocity"][1].get<double>(), -9.81 / 60, 0.01 * 9.81 / 60)
+            << "it falls with the next step";
+        const double before = part(31)["position"][1].get<double>(), after = part(240)["position"][1].get<double>();
+        EXPECT_NEAR(before - after, 0.4, 0.03) << engine << ": it stands on the stump";
+        EXPECT_NEAR(part(240)["position"][0].get<double>(), part(31)["position"][0].get<double>(), 0.03) << engine;
+        EXPECT_LT(std::abs(part(240)["linear_velocity"][1].get<double>()), 0.02) << engine;
+        EXPECT_EQ(run(world, {.seconds = 4, .backend = engine, .threads = 2, .edits = kCut}), out) << engine;
+    }
+}
+
+TEST(Simulate, WhatIsCutAgainIsCutFromWhatWasLeft) {
+    // The stump is cut off too, below the part that lies on it: the part stays a body, and falls with it.
+    const World world = parsed(kPillar);
+    std::vector<TimedCommand> twice = kCut;
+    twice.push_back(
+        {2.5, "cut",
+         R"({"time": 2.5, "command": {"add": {"id": "slit2", "shape": "box", "half_extents": [1, 0.1, 1], "position": [0, 0.5, 0], "op": "subtract"}}})",
+         2});
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 5, .every = 0.5, .backend = engine, .edits = twice});
+        ASSERT_EQ(out["bodies"].size(), 3u) << engine;
+        EXPECT_NEAR(out["bodies"][2]["mass"].get<double>(), 0.6 * 1.0 * 0.6 * 1000, 20)
+            << "no second copy of the first part";
+        const json& end = out["frames"].back();
+        EXPECT_NEAR(body(end, "part2")["position"][1].get<double>(), 0.9, 0.1) << engine;
+    }
+}
+
+TEST(Simulate, TriggersTellWhoEntersAndLeaves) {
+    const World world = parsed(R"({"format": 1,
+      "objects": {"gate": {"shape": "box", "half_extents": [1, 0.5, 1]}},
+      "edits": [
+        {"id": "ground", "shape": "plane"},
+        {"id": "ball", "shape": "sphere", "radius": 0.25, "position": [0, 5, 0]},
+        {"id": "ring", "shape": "torus", "major_radius": 0.3, "minor_radius": 0.1, "position": [6, 4, 0]}],
+      "bodies": [{"id": "b", "edits": ["ball"]}, {"id": "r", "edits": ["ring"]}],
+      "triggers": [
+        {"id": "floor", "object": "gate", "position": [6, 0, 0]},
+        {"id": "air", "object": "gate", "position": [0, 2.5, 0], "scale": 0.5, "rotation": [0, 0.3826834, 0, 0.9238795]}]})");
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 2, .every = 1, .backend = engine});
+        std::vector<std::string> told;
+        double in = 0, left = 0;
+        for (const json& e : out["events"]) {
+            const std::string type = e["type"];
+            if (type != "enter" && type != "leave") continue;
+            told.push_back(type + " " + e["a"].get<std::string>() + " " + e["b"].get<std::string>());
+            if (e["a"] == "air") (type == "enter" ? in : left) = e["time"].get<double>();
+        }
+        EXPECT_THAT(told, testing::ElementsAre("enter air b", "leave air b", "enter floor r")) << engine;
+        // Falls 2 m to touch the upper face, 3 m to leave the lower one.
+        EXPECT_NEAR(in, std::sqrt(2 * 2 / 9.81), 0.03);
+        EXPECT_NEAR(left, std::sqrt(2 * 3 / 9.81), 0.03);
+    }
+}
+
 }  // namespace

@@ -5,6 +5,7 @@
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/sdf_collision.h"
 
+#include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
 #include <BulletDynamics/ConstraintSolver/btNNCGConstraintSolver.h>
 #include <btBulletDynamicsCommon.h>
 
@@ -51,7 +52,7 @@ public:
 private:
     static btDefaultCollisionConstructionInfo info() {
         btDefaultCollisionConstructionInfo out;
-        out.m_customCollisionAlgorithmMaxElementSize = 128;  // of the pool that algorithms come from
+        out.m_customCollisionAlgorithmMaxElementSize = 192;  // of the pool that algorithms come from
         return out;
     }
 };
@@ -77,6 +78,30 @@ std::unique_ptr<btCollisionShape> make_shape(const Convex& c) {
         out->setMargin(std::min(0.04f, 0.1f * inner_radius(c)));
     return out;
 }
+
+// Triangles as Bullet wants them: the arrays stay ours, the tree and the angles at its edges are Bullet's.
+struct BulletMesh {
+    explicit BulletMesh(std::shared_ptr<const Triangles> given) : triangles(std::move(given)) {
+        btIndexedMesh part;
+        part.m_numTriangles = int(triangles->indices.size() / 3);
+        part.m_triangleIndexBase = reinterpret_cast<const unsigned char*>(triangles->indices.data());
+        part.m_triangleIndexStride = 3 * int(sizeof(uint32_t));
+        part.m_numVertices = int(triangles->vertices.size());
+        part.m_vertexBase = reinterpret_cast<const unsigned char*>(triangles->vertices.data());
+        part.m_vertexStride = int(sizeof(vec3));
+        array.addIndexedMesh(part, PHY_INTEGER);
+    }
+    std::unique_ptr<btCollisionShape> shape() {
+        auto out = std::make_unique<btBvhTriangleMeshShape>(&array, true);
+        out->setMargin(0);
+        out->setUserPointer(const_cast<Triangles*>(triangles.get()));
+        btGenerateInternalEdgeInfo(out.get(), &edges);
+        return out;
+    }
+    std::shared_ptr<const Triangles> triangles;
+    btTriangleIndexVertexArray array;
+    btTriangleInfoMap edges;
+};
 
 class BulletWorld;
 
@@ -105,6 +130,10 @@ public:
         // iterations, makes a stack of ten boxes sway more and more.
         solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
         solver.m_numIterations = 40;
+        // An island ends its iterations when the last one changed velocities by less than 3 mm/s in all.
+        solver.m_minimumSolverBatchSize = 1;
+        solver.m_leastSquaresResidualThreshold = 1e-5f;
+        dynamics_.setForceUpdateAllAabbs(false);
         solver.m_restitutionVelocityThreshold = 0.5f;
     }
     ~BulletWorld() override {
@@ -148,10 +177,12 @@ protected:
             object->shape = make_shape(*convex);
             object->shape->setUserPointer(&object->convex);
             object->inner_radius = inner_radius(*convex);
+        } else if (const auto* sdf = std::get_if<std::shared_ptr<const SdfShape>>(&b.settings.shape)) {
+            object->shape = std::make_unique<BulletSdfShape>(*sdf, b.body_from_mass);
+            object->inner_radius = float((*sdf)->inner_radius());
         } else {
-            const auto& sdf = std::get<std::shared_ptr<const SdfShape>>(b.settings.shape);
-            object->shape = std::make_unique<BulletSdfShape>(sdf, b.body_from_mass);
-            object->inner_radius = float(sdf->inner_radius());
+            object->mesh = std::make_unique<BulletMesh>(std::get<std::shared_ptr<const Triangles>>(b.settings.shape));
+            object->shape = object->mesh->shape();
         }
         const bool dynamic = b.settings.motion == Motion::Dynamic;
         const btVector3 inertia{float(b.mass.moments.x), float(b.mass.moments.y), float(b.mass.moments.z)};
@@ -167,12 +198,13 @@ protected:
         object->body = std::make_unique<btRigidBody>(info);
         object->body->setUserIndex(int(index));
         object->body->setUserPointer(this);
-        if (!b.settings.surfaces.empty())
+        if (!b.settings.surfaces.empty() || object->mesh != nullptr)
             object->body->setCollisionFlags(object->body->getCollisionFlags() |
                                             btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
         object->continuous = dynamic && b.settings.continuous;
         if (b.settings.motion == Motion::Kinematic) {
-            object->body->setCollisionFlags(object->body->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
+            const int flags = object->body->getCollisionFlags() & ~btCollisionObject::CF_STATIC_OBJECT;
+            object->body->setCollisionFlags(flags | btCollisionObject::CF_KINEMATIC_OBJECT);
             object->body->setActivationState(DISABLE_DEACTIVATION);
         }
         object->body->setLinearVelocity(to_bullet(b.settings.linear_velocity));
@@ -267,6 +299,7 @@ protected:
 private:
     struct Object {
         Convex convex;
+        std::unique_ptr<BulletMesh> mesh;
         std::unique_ptr<btCollisionShape> shape;
         std::unique_ptr<btRigidBody> body;
         float inner_radius = 0;
@@ -322,8 +355,14 @@ private:
     std::vector<std::unique_ptr<Object>> objects_;
 };
 
-bool contact_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int, int,
-                   const btCollisionObjectWrapper* b, int, int) {
+bool contact_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, int part_a, int index_a,
+                   const btCollisionObjectWrapper* b, int part_b, int index_b) {
+    // A body slides over the edge between two triangles as over one.
+    const auto is_triangle = [](const btCollisionObjectWrapper* w) {
+        return w->getCollisionShape()->getShapeType() == TRIANGLE_SHAPE_PROXYTYPE;
+    };
+    if (is_triangle(b)) btAdjustInternalEdgeContacts(point, b, a, part_b, index_b);
+    if (is_triangle(a)) btAdjustInternalEdgeContacts(point, a, b, part_a, index_a);
     const btCollisionObject &object_a = *a->getCollisionObject(), &object_b = *b->getCollisionObject();
     static_cast<const BulletWorld*>(object_a.getUserPointer())->give_surface(point, object_a, object_b);
     return true;

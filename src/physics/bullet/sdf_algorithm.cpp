@@ -57,6 +57,22 @@ public:
     void getAllContactManifolds(btManifoldArray& all) override { all.push_back(manifold_); }
 
 protected:
+    // Contacts found when the bodies lay as they still do, within half a millimetre and a sixth of a degree, are good for another step;
+    // Bullet moves their points along. (Jolt does so too.)
+    bool as_before(const Pose& second_from_first, uint32_t revision, btManifoldResult* result) {
+        constexpr float kPlace = 5e-4f, kTurn = 3e-3f;
+        const quat turn = conjugate(found_at_.rotation) * second_from_first.rotation;
+        const float way = length(second_from_first.position - found_at_.position);
+        if (manifold_->getNumContacts() > 0 && revision == revision_ && way < kPlace &&
+            2 * std::hypot(turn.x, turn.y, turn.z) < kTurn) {
+            result->setPersistentManifold(manifold_);
+            result->refreshContactPoints();
+            return true;
+        }
+        found_at_ = second_from_first;
+        revision_ = revision;
+        return false;
+    }
     float margin() const { return manifold_->getContactBreakingThreshold(); }
     // Points of body 0's side, normals out of body 1, in the frame `world_from_field`.
     void add(btManifoldResult* result, const Pose& world_from_field, bool field_is_first) {
@@ -75,6 +91,8 @@ protected:
     }
 
     btPersistentManifold* manifold_;
+    Pose found_at_;
+    uint32_t revision_ = ~0u;
     std::vector<FieldContact> contacts_;
 };
 
@@ -88,23 +106,37 @@ public:
         const btCollisionObjectWrapper *field = kFieldFirst ? a : b, *convex = kFieldFirst ? b : a;
         const auto& shape = static_cast<const BulletSdfShape&>(*field->getCollisionShape());
         const Pose world_from_field = to_pose(field->getWorldTransform()) * inverse(shape.field_from_body());
-        collide(shape.sdf().field(), convex_of(convex->getCollisionShape()),
-                inverse(world_from_field) * to_pose(convex->getWorldTransform()), margin(), contacts_);
+        const Pose field_from_convex = inverse(world_from_field) * to_pose(convex->getWorldTransform());
+        if (as_before(field_from_convex, shape.revision(), result)) return;
+        collide(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
         result->setPersistentManifold(manifold_);
         add(result, world_from_field, kFieldFirst);
     }
 };
 
+// Two fields, or a field and a mesh, which is met as the solid that it is the surface of.
 class FieldsAlgorithm final : public SdfAlgorithm {
 public:
     using SdfAlgorithm::SdfAlgorithm;
+    struct Side {
+        const SdfShape* sdf;
+        Pose world;
+        uint32_t revision;
+    };
+    static Side side_of(const btCollisionObjectWrapper* w) {
+        const Pose world = to_pose(w->getWorldTransform());
+        if (w->getCollisionShape()->getShapeType() != CUSTOM_CONCAVE_SHAPE_TYPE)
+            return {static_cast<const Triangles*>(w->getCollisionShape()->getUserPointer())->solid.get(), world, 0};
+        const auto& shape = static_cast<const BulletSdfShape&>(*w->getCollisionShape());
+        return {&shape.sdf(), world * inverse(shape.field_from_body()), shape.revision()};
+    }
     void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
                           btManifoldResult* result) override {
-        const auto& shape_a = static_cast<const BulletSdfShape&>(*a->getCollisionShape());
-        const auto& shape_b = static_cast<const BulletSdfShape&>(*b->getCollisionShape());
-        const Pose world_from_a = to_pose(a->getWorldTransform()) * inverse(shape_a.field_from_body());
-        const Pose world_from_b = to_pose(b->getWorldTransform()) * inverse(shape_b.field_from_body());
-        collide(shape_a.sdf(), shape_b.sdf(), inverse(world_from_b) * world_from_a, margin(), contacts_);
+        const Side side_a = side_of(a), side_b = side_of(b);
+        const Pose world_from_b = side_b.world;
+        const Pose b_from_a = inverse(world_from_b) * side_a.world;
+        if (as_before(b_from_a, side_a.revision + side_b.revision, result)) return;
+        collide(*side_a.sdf, *side_b.sdf, b_from_a, margin(), contacts_);
         result->setPersistentManifold(manifold_);
         add(result, world_from_b, false);
     }
@@ -160,6 +192,8 @@ SdfAlgorithms::SdfAlgorithms(btCollisionDispatcher& dispatcher)
         dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, type, swapped_.get());
     }
     dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, CUSTOM_CONCAVE_SHAPE_TYPE, fields_.get());
+    dispatcher.registerCollisionCreateFunc(CUSTOM_CONCAVE_SHAPE_TYPE, TRIANGLE_MESH_SHAPE_PROXYTYPE, fields_.get());
+    dispatcher.registerCollisionCreateFunc(TRIANGLE_MESH_SHAPE_PROXYTYPE, CUSTOM_CONCAVE_SHAPE_TYPE, fields_.get());
 }
 SdfAlgorithms::~SdfAlgorithms() = default;
 

@@ -24,7 +24,11 @@ class BulletSdfShape final : public btConcaveShape {
 public:
     BulletSdfShape(std::shared_ptr<const SdfShape> shape, const Pose& field_from_body);
     const SdfShape& sdf() const { return *sdf_; }
-    void set(std::shared_ptr<const SdfShape> shape) { sdf_ = std::move(shape); }
+    void set(std::shared_ptr<const SdfShape> shape) {
+        sdf_ = std::move(shape);
+        ++revision_;
+    }
+    uint32_t revision() const { return revision_; }  ///< how often it was another field
     const Pose& field_from_body() const { return field_from_body_; }
 
     void getAabb(const btTransform& t, btVector3& low, btVector3& high) const override;
@@ -37,6 +41,7 @@ public:
 private:
     std::shared_ptr<const SdfShape> sdf_;
     Pose field_from_body_;
+    uint32_t revision_ = 0;
     btVector3 one_{1, 1, 1};
 };
 

@@ -14,6 +14,7 @@
 #include <Jolt/Physics/Collision/Shape/BoxShape.h>
 #include <Jolt/Physics/Collision/Shape/CapsuleShape.h>
 #include <Jolt/Physics/Collision/Shape/CylinderShape.h>
+#include <Jolt/Physics/Collision/Shape/MeshShape.h>
 #include <Jolt/Physics/Collision/Shape/SphereShape.h>
 #include <Jolt/Physics/PhysicsSystem.h>
 #include <Jolt/RegisterTypes.h>
@@ -79,6 +80,22 @@ Ref<JPH::Shape> make_shape(const Convex& c) {
     return nullptr;
 }
 
+Ref<JPH::Shape> make_mesh(const Triangles& t) {
+    VertexList vertices;
+    IndexedTriangleList triangles;
+    for (const vec3 v : t.vertices) vertices.push_back({v.x, v.y, v.z});
+    for (size_t i = 0; i < t.indices.size(); i += 3)
+        triangles.push_back(IndexedTriangle(t.indices[i], t.indices[i + 1], t.indices[i + 2], 0));
+    MeshShapeSettings settings(std::move(vertices), std::move(triangles));
+    settings.mActiveEdgeCosThresholdAngle = -1;  // inner edges are found when bodies touch them (EIER, below)
+    settings.mBuildQuality = MeshShapeSettings::EBuildQuality::FavorBuildSpeed;
+    const JPH::Shape::ShapeResult made = settings.Create();
+    if (made.HasError()) return nullptr;  // no triangle with an area
+    const Ref<JPH::Shape> shape = made.Get();
+    shape->SetUserData(reinterpret_cast<uint64>(&t));
+    return shape;
+}
+
 class JoltWorld final : public World, private ContactListener {
 public:
     explicit JoltWorld(const WorldSettings& settings) : scratch_(kScratchBytes) {
@@ -130,8 +147,12 @@ protected:
             object->convex = *convex;
             object->shape = make_shape(*convex);
             object->shape->SetUserData(reinterpret_cast<uint64>(&object->convex));
+        } else if (const auto* sdf = std::get_if<std::shared_ptr<const SdfShape>>(&b.settings.shape)) {
+            object->shape = new JoltSdfShape(*sdf);
         } else {
-            object->shape = new JoltSdfShape(std::get<std::shared_ptr<const SdfShape>>(b.settings.shape));
+            object->triangles = std::get<std::shared_ptr<const Triangles>>(b.settings.shape);
+            object->shape = make_mesh(*object->triangles);
+            if (object->shape == nullptr) object->shape = new JoltSdfShape(object->triangles->solid);
         }
         const bool fixed = b.settings.motion == Motion::Static, dynamic = b.settings.motion == Motion::Dynamic;
         BodyCreationSettings settings(object->shape, to_jolt(b.settings.pose.position),
@@ -141,6 +162,7 @@ protected:
                                                 : EMotionType::Kinematic,
                                       fixed ? kStands : kMoves);
         settings.mUserData = index;
+        settings.mEnhancedInternalEdgeRemoval = object->triangles != nullptr;
         settings.mFriction = b.settings.friction;
         settings.mRestitution = b.settings.restitution;
         settings.mLinearDamping = settings.mAngularDamping = 0;
@@ -214,7 +236,9 @@ protected:
 
     void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
         auto& shape = static_cast<JoltSdfShape&>(*objects_[index]->shape);
+        const bool same = shape.sdf().bounds() == field->bounds();
         shape.set(std::move(field));
+        if (same) return;
         interface().NotifyShapeChanged(objects_[index]->id, shape.GetCenterOfMass(), false, EActivation::DontActivate);
     }
 
@@ -261,6 +285,7 @@ protected:
 private:
     struct Object {
         Convex convex;
+        std::shared_ptr<const Triangles> triangles;
         Ref<JPH::Shape> shape;
         BodyID id;
         bool damped = false;

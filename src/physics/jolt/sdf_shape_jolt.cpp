@@ -76,7 +76,7 @@ void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
     const CallInStep call;
     static thread_local std::vector<FieldContact> contacts;
     const Pose world = world_of(field_of(shape2), transform2);
-    collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1),
+    collide(field_of(shape2).sdf(), convex_of(shape1), inverse(world) * pose_of(transform1),
             settings.mMaxSeparationDistance, contacts);
     add(contacts, world, false, id1, id2, collector);
 }
@@ -90,6 +90,39 @@ void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
     collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance,
             contacts);
     add(contacts, world2, true, id1, id2, collector);
+}
+
+// A field meets a mesh as the solid that the mesh is the surface of.
+void collide_mesh(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
+                  Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator&,
+                  const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+    static thread_local std::vector<FieldContact> contacts;
+    const Pose world1 = world_of(field_of(shape1), transform1), world2 = pose_of(transform2);
+    collide(field_of(shape1).sdf(), *triangles_of(shape2).solid, inverse(world2) * world1,
+            settings.mMaxSeparationDistance, contacts);
+    // The mesh's part is one and the same: contacts are told apart by the field's.
+    for (const FieldContact& c : contacts) {
+        if (collector.ShouldEarlyOut()) return;
+        if (-c.depth >= collector.GetEarlyOutFraction()) continue;
+        const vec3 normal = rotate(world2.rotation, c.normal), on1 = world2 * c.point;
+        collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
+                                            id1.PushID(number_of(c.normal), 2 * kNormalBits).GetID(), SubShapeID(),
+                                            TransformedShape::sGetBodyID(collector.GetContext())));
+    }
+}
+
+void cast_at_mesh(const ShapeCast& moving, const ShapeCastSettings&, const JPH::Shape* shape2, Vec3Arg,
+                  const ShapeFilter&, Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator&,
+                  CastShapeCollector& collector) {
+    const vec3 way = to_vec(moving.mDirection);
+    const auto hit =
+        sweep(triangles_of(shape2).solid->field(), Convex::sphere(field_of(moving.mShape).GetInnerRadius()),
+              pose_of(moving.mCenterOfMassStart), way, std::min(collector.GetEarlyOutFraction(), 1.0f));
+    if (!hit || hit->fraction >= collector.GetEarlyOutFraction()) return;
+    const Vec3 point = transform2 * to_jolt(hit->point);
+    collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)), false,
+                                     id1.PushID(number_of(hit->normal), 2 * kNormalBits).GetID(), SubShapeID(),
+                                     TransformedShape::sGetBodyID(collector.GetContext())));
 }
 
 // Given relative to the centre of mass of shape 2. A field is cast as the largest ball in it.
@@ -130,6 +163,9 @@ void JoltSdfShape::register_pairs() {
         CollisionDispatch::sRegisterCastShape(convex, kType, cast);
         CollisionDispatch::sRegisterCastShape(kType, convex, CollisionDispatch::sReversedCastShape);
     }
+    CollisionDispatch::sRegisterCollideShape(kType, EShapeSubType::Mesh, collide_mesh);
+    CollisionDispatch::sRegisterCollideShape(EShapeSubType::Mesh, kType, CollisionDispatch::sReversedCollideShape);
+    CollisionDispatch::sRegisterCastShape(kType, EShapeSubType::Mesh, cast_at_mesh);
     CollisionDispatch::sRegisterCollideShape(kType, kType, collide_fields);
     CollisionDispatch::sRegisterCastShape(kType, kType, cast);
 }

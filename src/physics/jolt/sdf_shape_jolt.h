@@ -70,6 +70,10 @@ private:
     std::shared_ptr<const SdfShape> sdf_;
 };
 
+/// What a mesh is made of, likewise.
+inline const Triangles& triangles_of(const JPH::Shape* s) {
+    return *reinterpret_cast<const Triangles*>(s->GetUserData());
+}
 /// What a convex shape of ours is, kept as Jolt's user data of the shape.
 inline const Convex& convex_of(const JPH::Shape* s) { return *reinterpret_cast<const Convex*>(s->GetUserData()); }
 

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: MIT
+// BrickField: a field as bodies touch it. Near the surface its distances are read from host bricks of one voxel size, made where
+// somebody asks and kept; far from it, and far from the origin, the exact field answers. What a point is told is a function of
+// that field, voxel size and point alone, whoever asked before and whatever is kept: so steps do not depend on threads, cameras or budgets.
+//
+// A brick here has the values of its 8x8x8 texels as floats in metres, cut off nowhere: bodies ask deeper and farther than pictures do.
+// Between texels values are trilinear, so they may exceed the true distance by 0.8661 voxel (docs/architecture.md): contacts are found
+// by them, casts advance by the exact field.
+#pragma once
+
+#include "field/brick.gpu.h"
+#include "field/sdf_field.h"
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+
+namespace kiln::field {
+
+struct BrickFieldOptions {
+    float voxel_size = 0.02f;      ///< metres, > 0
+    float near = 0.1f;             ///< metres: cells that may hold a value as small as this have bricks
+    size_t most_bricks = 1 << 16;  ///< kept at a time, 2 KiB each; what is asked beyond is made anew each time
+};
+
+/// All functions but renewed() and after(): any thread.
+class BrickField final : public SdfField {
+public:
+    BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options);
+    /// Of a bounded body: voxels of at most `most_voxel`, and 32 across its least extent; bricks all around it.
+    static std::shared_ptr<const BrickField> of_body(std::shared_ptr<const SdfField> exact, float most_voxel);
+    /// The field of `exact`, whose solid differs from this one's in `changed` only. Keeps the bricks that stay what they were.
+    std::shared_ptr<const BrickField> after(std::shared_ptr<const SdfField> exact, const Box3& changed) const;
+
+    float distance(vec3 p) const override { return ask(p, nullptr); }
+    float distance(vec3 p, vec3& gradient) const override { return ask(p, &gradient); }
+    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
+    void distances(const sdf::Points& points, float* out) const override;
+    uint32_t material(vec3 p) const override { return exact_->material(p); }
+    Box3 bounds() const override { return exact_->bounds(); }
+    /// Half a voxel at corners and edges of right angles; less than the square of a voxel over 8 radii where the surface is smooth.
+    float error() const override { return 0.5f * options_.voxel_size; }
+    std::shared_ptr<const SdfField> renewed() const override;
+
+    const SdfField& exact() const { return *exact_; }
+    float voxel_size() const { return options_.voxel_size; }
+    size_t brick_count() const { return bricks_.load(std::memory_order_relaxed); }
+
+private:
+    struct Room {
+        size_t cells;
+    };
+
+public:
+    /// Of after() and renewed(), whose tables grow with what is asked.
+    BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options, Room room);
+
+private:
+    struct alignas(64) Brick {
+        std::atomic<uint32_t> holders{1};  // tables
+        std::array<float, kBrickTexelCount> distance;
+    };
+    // Open addressing. A key is claimed first, then its brick published; nothing is ever taken out.
+    struct Slot {
+        std::atomic<uint64_t> key{0};
+        std::atomic<Brick*> brick{nullptr};
+        std::atomic<uint32_t> asked{0};  // last generation in which someone did
+    };
+    struct Table {
+        explicit Table(size_t slots);
+        ~Table();
+        std::unique_ptr<Slot[]> slots;
+        int shift;
+    };
+    // A cell looked at last.
+    struct Cursor {
+        uint64_t key = 0;
+        const Brick* brick = nullptr;
+    };
+
+    float ask(vec3 p, vec3* gradient) const {
+        Cursor cursor;
+        return ask(p, gradient, cursor);
+    }
+    float ask(vec3 p, vec3* gradient, Cursor& cursor) const;
+    const Brick* find(uint64_t key, ivec3 cell) const;
+    bool make(ivec3 cell, Brick& out) const;
+    void adopt(const BrickField& old, const Box3& changed, uint32_t asked_since);
+    static Brick* far_cell();
+    static void let_go(Brick* brick);
+
+    std::shared_ptr<const SdfField> exact_;
+    BrickFieldOptions options_;
+    float voxels_per_metre_;
+    Table table_;
+    size_t room_;  // cells the table takes
+    mutable std::atomic<size_t> bricks_ = 0, cells_ = 0;
+    mutable std::atomic<uint32_t> generation_ = 1;
+};
+
+}  // namespace kiln::field

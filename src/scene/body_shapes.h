@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: MIT
+// What the bodies of a scene are made of: the world's list without their edits is the ground; a body's edits, brought to the frame of its
+// first, are its own.
+#pragma once
+
+#include "field/sdf_field.h"
+#include "physics/physics.h"
+#include "scene/world_impl.h"
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_set>
+#include <vector>
+
+namespace kiln::scene {
+
+/// Of a body: its first edit's, without scale.
+physics::Pose frame_of(const Edit& first);
+/// The edits of a body in its frame, the first as a union.
+std::vector<Edit> in_frame(std::vector<Edit> edits);
+/// The exact convex shape of a body of one edit, where it has one.
+std::optional<physics::Convex> convex_of(std::span<const Edit> edits);
+/// The world's list without the edits of bodies.
+std::vector<Edit> ground_of(const World::Impl& world, const std::unordered_set<std::string>& owned);
+Result<std::shared_ptr<const field::ProgramField>> field_of(World::Impl& world, std::span<const Edit> edits);
+/// Where the solids of two lists may differ: around the edits between what the lists begin and end with.
+Result<Box3> changed_box(World::Impl& world, std::span<const Edit> before, std::span<const Edit> after);
+
+}  // namespace kiln::scene

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MIT
+// Simulation: a scene's bodies, run from their start. The ground is the world's list without the edits of bodies, read from host bricks
+// near what moves; commands with times change a copy of the world on the way, and what they cut loose becomes a body. The order of a
+// step: commands, ground and loose parts, physics, triggers.
+#pragma once
+
+#include "field/brick_field.h"
+#include "field/loose.h"
+#include "physics/physics.h"
+#include "physics/triggers.h"
+#include "scene/world_impl.h"
+
+#include <kiln/world.h>
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <unordered_set>
+#include <vector>
+
+namespace kiln::scene {
+
+class Simulation {
+public:
+    /// `start` stays as it is and must outlive the simulation.
+    static Result<std::unique_ptr<Simulation>> make(const World& start, const SimulateSettings& settings);
+
+    /// Commands whose time has come, then one fixed step.
+    Result<void> step();
+
+    const physics::World& world() const { return *world_; }
+    int64_t steps() const { return steps_; }
+    double time() const { return double(steps_) * double(seconds_); }
+
+    /// Bodies of the scene in its order, then parts in the order they came loose.
+    struct Member {
+        std::string id;
+        physics::BodyId body;
+    };
+    const std::vector<Member>& members() const { return members_; }
+
+    /// Of the last step: contacts that began or ended, then who entered or left triggers.
+    struct Event {
+        const char* type;  ///< "begin", "end", "enter", "leave"
+        std::string a, b;
+    };
+    const std::vector<Event>& events() const { return events_; }
+
+private:
+    explicit Simulation(const World& start) : start_(start) {}
+    Result<void> add_bodies(const SimulateSettings& settings);
+    Result<void> add_triggers();
+    Result<void> apply_commands();
+    /// The world's list is this now, but for what came loose; it differs from what was there in `changed`.
+    Result<void> set_ground(std::shared_ptr<const field::ProgramField> list, const Box3& changed);
+    std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
+    Result<void> add(const physics::BodySettings& body, std::string_view name);
+    Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
+    std::string name_of(physics::BodyId id) const;
+
+    const World& start_;
+    std::unique_ptr<physics::World> world_;
+    physics::Triggers triggers_;
+    std::vector<std::string> trigger_names_;  // by index
+    std::unordered_set<std::string> owned_;   // edits of bodies
+    std::vector<Member> members_;
+    std::vector<std::string> names_;  // by index of the body
+    std::vector<Event> events_;
+    float seconds_ = 0;
+    int64_t steps_ = 0;
+
+    // The ground.
+    std::vector<Edit> edits_;
+    std::shared_ptr<const field::SdfField> ground_;  // the list, with the parts that came loose cut out
+    std::shared_ptr<const field::BrickField> bricks_;
+    std::vector<field::LayeredField::Layer> cuts_;
+    std::optional<physics::BodyId> ground_body_;
+    float voxel_size_ = 0, near_ = 0;  // metres
+    int parts_ = 0;
+
+    // Commands.
+    std::vector<TimedCommand> commands_;
+    size_t done_ = 0;
+    std::optional<World> edited_;  // the world as they change it; made when the first comes
+};
+
+}  // namespace kiln::scene
