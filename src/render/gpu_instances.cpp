@@ -101,9 +101,8 @@ Result<void> GpuInstances::update(std::span<const Instance> instances) {
         Set& set = sets_.at(bricks.get());
         bricks_ += bricks->field().stats().bricks;
         if (!another && set.written) continue;
-        if (bricks->field().options().format != (field_->format() == rhi::Format::R16Float
-                                                     ? field::DistanceFormat::Half
-                                                     : field::DistanceFormat::Snorm8))
+        if (bricks->field().options().format !=
+            (field_->format() == rhi::Format::R16Float ? field::DistanceFormat::Half : field::DistanceFormat::Snorm8))
             return Error{"an instance's bricks are not stored as the field's are; make them with its format"};
         const uint32_t first = end - uint32_t(*set.place) - slots_of(*bricks);
         if (auto stored = field_->store_reserved(bricks->bricks(), first); !stored) return stored;
@@ -124,9 +123,9 @@ Result<void> GpuInstances::buffer_of(rhi::BufferHandle& buffer, std::string_view
     const uint64_t most =
         std::min(runner_->device().limits().max_storage_binding, runner_->device().limits().max_buffer);
     if (bytes.size() > most)
-        return Error{formatted("the instances' {} need {} bytes, a buffer of this device holds {}", name, bytes.size(),
-                               most),
-                     ErrorKind::OutOfMemory};
+        return Error{
+            formatted("the instances' {} need {} bytes, a buffer of this device holds {}", name, bytes.size(), most),
+            ErrorKind::OutOfMemory};
     auto made = runner_->device().create_buffer({.size = std::max<uint64_t>(bytes.size(), 16), .label = name});
     if (!made) return made.error();
     buffer = *made;
@@ -210,8 +209,8 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
                 moved -= turned[j] * (at[j] - eye[j]);
             }
             *before_rows[k] = {float(turned[0]), float(turned[1]), float(turned[2]), float(moved / h)};
-            const double center = at[k] - eye[k] + now.rows[k][0] * middle.x + now.rows[k][1] * middle.y +
-                                  now.rows[k][2] * middle.z;
+            const double center =
+                at[k] - eye[k] + now.rows[k][0] * middle.x + now.rows[k][1] * middle.y + now.rows[k][2] * middle.z;
             const double reach = std::fabs(now.rows[k][0]) * half.x + std::fabs(now.rows[k][1]) * half.y +
                                  std::fabs(now.rows[k][2]) * half.z;
             const double slack = 1e-6 * (std::fabs(center) + reach) + 1e-3 * voxel;

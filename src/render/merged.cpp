@@ -9,7 +9,9 @@
 namespace kiln::render {
 
 Result<sdf::Program> merged_program(const Frame& frame) {
-    sdf::Program out = frame.levels ? *frame.levels->program() : frame.field->program();
+    const sdf::Program& beside = frame.levels ? *frame.levels->program() : frame.field->program();
+    if (frame.instances.empty()) return beside;
+    sdf::Program out = sdf::detached(beside);
     uint64_t order = 0;
     for (const uint32_t row : out.rows()) order = std::max(order, out.edits[row].order);
     for (const Instance& i : frame.instances) {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace kiln::sdf {
 
@@ -85,6 +86,19 @@ Box3 solid_box(const Program& object) {
     for (const uint32_t row : object.rows()) slowest = std::min(slowest, object.edits[row].rate);
     // A chain of smooth minima with radii up to k goes less than k below the least of its operands.
     return object.bounds.inflated(object.index.largest_reach() / slowest);
+}
+
+Program detached(const Program& program) {
+    const auto own = [](const auto& from) {
+        std::remove_cvref_t<decltype(from)> out;
+        out.append(from.subspan(0, from.size()));
+        return out;
+    };
+    Program out = program;
+    out.code = own(program.code);
+    out.params = own(program.params);
+    out.edits = own(program.edits);
+    return out;
 }
 
 Result<uint32_t> place(Program& world, const Program& object, const Pose& pose, uint32_t material, uint64_t order) {

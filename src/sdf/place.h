@@ -12,6 +12,9 @@ namespace kiln::sdf {
 /// Holds the solid of a program without unbounded edits: where its edits blend, it bulges beyond them.
 Box3 solid_box(const Program& object);
 
+/// A copy with arrays of its own, but for samples: what is appended to it costs the original nothing, and any thread may append.
+Program detached(const Program& program);
+
 /// Appends `object` to `world`, put there by `pose`, with this place in the order; answers its row. The first edit of the object counts as
 /// a union. What has material 0 takes `material`. Its edits keep their owners: rows that
 /// are never visible carry them, behind the row itself, and its code names those.

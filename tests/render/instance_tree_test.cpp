@@ -79,8 +79,7 @@ TEST(InstanceTree, ARayFromTheEyeMeetsNearBoxesBeforeFarOnesOfARow) {
         size_t looked = 0;
         const std::vector<uint32_t> met = walk(instance_tree(row), {side, 0.001f, 0.001f}, looked);
         ASSERT_EQ(met.size(), row.size());
-        for (size_t i = 1; i < met.size(); ++i)
-            EXPECT_LT(std::abs(row[met[i - 1]].min.x), std::abs(row[met[i]].min.x));
+        for (size_t i = 1; i < met.size(); ++i) EXPECT_LT(std::abs(row[met[i - 1]].min.x), std::abs(row[met[i]].min.x));
     }
 }
 

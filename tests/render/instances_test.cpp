@@ -69,8 +69,7 @@ Pair pair_of(const field::worlds::World& base) {
     for (const auto& [thing, pose] : things()) {
         all.edits.push_back(at(thing, pose));
         auto same = std::find_if(sets.begin(), sets.end(), [&](const auto& s) { return s.first == thing; });
-        if (same == sets.end())
-            same = sets.emplace(sets.end(), thing, set_of({thing}, base.options.voxel_size));
+        if (same == sets.end()) same = sets.emplace(sets.end(), thing, set_of({thing}, base.options.voxel_size));
         out.instances.instances.push_back({.bricks = same->second, .pose = pose, .before = pose, .material = 0});
     }
     out.edits = frame_of(all);
@@ -94,7 +93,8 @@ TEST(InstancePicturesGpu, DrawWhatTheSameEditsInTheWorldDraw) {
     };
     // Half shadows of several things are multiplied, so a wide disc behind two of them is a little darker. Without refining, each shows
     // the rounding of its own voxels.
-    for (const Case c : {Case{0.53f, true, 20, 0.003}, {0, true, 20, 0.003}, {12, true, 20, 0.01}, {0.53f, false, 60, 0.006}}) {
+    for (const Case c :
+         {Case{0.53f, true, 20, 0.003}, {0, true, 20, 0.003}, {12, true, 20, 0.01}, {0.53f, false, 60, 0.006}}) {
         for (Frame* f : {&pair.edits, &pair.instances}) f->lights[0].angular_diameter_deg = c.disc_deg;
         const RenderSettings settings{.width = 160, .height = 120, .refine = c.refine};
         auto a = renderer->render(pair.edits, settings);
@@ -189,7 +189,8 @@ TEST(InstancePicturesGpu, MovingBakesNothingAndWhatIsBehindIsSeenAgain) {
     frame.instances.clear();
     ASSERT_TRUE(renderer->render(frame, settings));
     EXPECT_EQ(renderer->stats().instances, 0);
-    frame.instances = {{.bricks = set_of({edit(Sphere{.radius = 0.3f})}, 0.04f), .pose = {{0, 1, 1}, {}}, .before = {}}};
+    frame.instances = {
+        {.bricks = set_of({edit(Sphere{.radius = 0.3f})}, 0.04f), .pose = {{0, 1, 1}, {}}, .before = {}}};
     ASSERT_TRUE(renderer->render(frame, settings));
     EXPECT_GT(renderer->stats().instance_bricks_new, 0u);
     ASSERT_TRUE(renderer->render(frame_of(field::worlds::jumble()), settings));
@@ -224,8 +225,9 @@ TEST(InstancePicturesGpu, StandAmongTheLevelsOfAClipmap) {
     const Pair pair = pair_of(base);
     const vec3 eye = pair.edits.camera.position;
     const auto levels_of = [&](const std::vector<Edit>& edits) {
-        auto map = field::Clipmap::make(field::worlds::compiled(edits), {.voxel_size = 0.012f, .levels = 4, .cells = 64},
-                                        {double(eye.x), double(eye.y), double(eye.z)});
+        auto map =
+            field::Clipmap::make(field::worlds::compiled(edits), {.voxel_size = 0.012f, .levels = 4, .cells = 64},
+                                 {double(eye.x), double(eye.y), double(eye.z)});
         EXPECT_TRUE(map);
         map->work();
         return std::make_shared<const field::Clipmap>(std::move(*map));
@@ -355,8 +357,7 @@ TEST_F(InstancesGpu, RecordsTakeAPointToWhereItWas) {
         // And into the object's voxels, which does not suffer from being far out.
         const auto inside = [&](int whole, vec4 row) {
             return double(whole) + double(row.w) +
-                   double(record.voxels) *
-                       (double(row.x) * now.x + double(row.y) * now.y + double(row.z) * now.z);
+                   double(record.voxels) * (double(row.x) * now.x + double(row.y) * now.y + double(row.z) * now.z);
         };
         const double voxel = double(set->voxel_size());
         EXPECT_NEAR(inside(record.eye_x, record.x), double(local.x) / voxel, 2e-2 * 0.05 / voxel);

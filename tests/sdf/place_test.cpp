@@ -60,8 +60,9 @@ TEST(Place, IsTheObjectThroughTheInverseOfItsPoseInAHardUnion) {
                           pose.position.z + random.in(-2, 2)};
             // In double, and through no code of place()'s.
             const quat q = conjugate(pose.rotation);
-            const vec3 local = rotate(q, vec3{float(p.x - double(pose.position.x)), float(p.y - double(pose.position.y)),
-                                              float(p.z - double(pose.position.z))});
+            const vec3 local =
+                rotate(q, vec3{float(p.x - double(pose.position.x)), float(p.y - double(pose.position.y)),
+                               float(p.z - double(pose.position.z))});
             const double expected_object =
                 evaluate(view(object), dvec3{double(local.x), double(local.y), double(local.z)});
             const double expected = std::min(evaluate(view(alone), p), expected_object);

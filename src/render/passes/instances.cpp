@@ -28,11 +28,11 @@ void march_instances(Graph& g, const TileInputs& in, Visibility& seen) {
         ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
     Image words = g.create("visibility with instances", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     Buffer counted = g.create_buffer("march instances evaluations", uint64_t{groups} * 4);
-    g.dispatch(kMarchInstances, in.size,
-               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-                g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(seen.words),
-                g.write(words), g.write(counted)},
-               push_of(i));
+    g.dispatch(
+        kMarchInstances, in.size,
+        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
+         g.read(in.field.tables), g.read(in.field.distances), g.read(seen.words), g.write(words), g.write(counted)},
+        push_of(i));
     seen.evaluations.push_back(counted);
     seen.words = words;
 }
@@ -49,11 +49,11 @@ void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, 
                        Surface& surface) {
     const InstanceHandles& i = in.instances;
     if (!i) return;
-    g.dispatch(kResolveInstances, in.size,
-               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records),
-                g.read(in.rays), g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances),
-                g.read(in.field.materials), g.read(visibility), g.read(refined), g.write(surface.words),
-                g.write(surface.depth), g.write(surface.seen)});
+    g.dispatch(
+        kResolveInstances, in.size,
+        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records), g.read(in.rays),
+         g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances), g.read(in.field.materials),
+         g.read(visibility), g.read(refined), g.write(surface.words), g.write(surface.depth), g.write(surface.seen)});
 }
 
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,

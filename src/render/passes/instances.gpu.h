@@ -24,8 +24,9 @@ struct InstanceSet {
 // One instance (128 bytes). A point p from the eye is at eye + part + voxels * (rotation p) in its object's voxels.
 struct InstanceRecord {
     vec4 x, y, z;  // rows of the rotation into the object; w: part of the voxel that the eye is in, [0, 1)
-    vec4 before_x, before_y, before_z;  // rows of what takes a point from the eye to where it was one frame before, from this eye
-    int eye_x, eye_y, eye_z;            // voxel of the object that the eye is in
+    vec4 before_x, before_y,
+        before_z;             // rows of what takes a point from the eye to where it was one frame before, from this eye
+    int eye_x, eye_y, eye_z;  // voxel of the object that the eye is in
     uint set;
     float voxels;   // of the object a finest voxel
     uint material;  // where the set says 0
