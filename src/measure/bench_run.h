@@ -59,5 +59,6 @@ struct BenchFamily {
 };
 BenchFamily field_family();
 BenchFamily journal_family();
+BenchFamily world_family();
 
 }  // namespace kiln::measure

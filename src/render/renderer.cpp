@@ -244,6 +244,8 @@ Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSe
     merged.instances.clear();
     auto picture = render(merged, settings);
     stats.instances = int(frame.instances.size());
+    // Each is one edit of the merged program, whatever it is made of.
+    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size()) - 1;
     return picture;
 }
 
@@ -319,6 +321,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.exposure = eye.multiplier;
     stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
     stats.edits = int(program.index.size());
+    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size());
     for (int level = 0; levels && level < frame.levels->level_count(); ++level) {
         const field::LevelCounts& c = frame.levels->counts(level);
         stats.levels.push_back({double(frame.levels->voxel_size(level)), c.bricks, c.missing_cells, c.refused_cells,

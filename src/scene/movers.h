@@ -21,8 +21,8 @@ struct Mover {
     Pose pose, before;            ///< now, and as the last frame saw it
     Pose row_pose;                ///< that a dynamic edit's row is compiled for
     bool apart = false;
-    uint32_t material = 0;                       ///< number of what its parts without one are made of
-    std::shared_ptr<const sdf::Program> object;  ///< its edits in its frame
+    uint32_t material = 0;                          ///< number of what its parts without one are made of
+    std::shared_ptr<const sdf::Program> object;     ///< its edits in its frame
     std::shared_ptr<const field::BrickSet> bricks;  ///< made when it is first drawn …
     float bricks_for = 0;                           ///< … beside a field of this voxel size
 };

@@ -41,9 +41,9 @@ Box3 posed_box(const sdf::Program& object, const Pose& pose) {
     const Box3 solid = sdf::solid_box(object);
     Box3 out;
     for (int corner = 0; corner < 8 && !solid.empty(); ++corner) {
-        const vec3 p = pose * vec3{(corner & 1) != 0 ? solid.max.x : solid.min.x,
-                                   (corner & 2) != 0 ? solid.max.y : solid.min.y,
-                                   (corner & 4) != 0 ? solid.max.z : solid.min.z};
+        const vec3 p =
+            pose * vec3{(corner & 1) != 0 ? solid.max.x : solid.min.x, (corner & 2) != 0 ? solid.max.y : solid.min.y,
+                        (corner & 4) != 0 ? solid.max.z : solid.min.z};
         out = box_union(out, {p, p});
     }
     return out;
@@ -289,8 +289,7 @@ Result<void> World::Impl::instances_of(float field_voxel, field::DistanceFormat 
             m.bricks = known.lock();
             if (!m.bricks) {
                 auto made = field::BrickSet::make(m.object, voxel, format);
-                if (!made)
-                    return Error{edits[key].edit->name + ": " + made.error().message, made.error().kind};
+                if (!made) return Error{edits[key].edit->name + ": " + made.error().message, made.error().kind};
                 m.bricks = std::move(*made);
                 known = m.bricks;
             }
@@ -309,9 +308,9 @@ Result<void> World::move(EditId id, const Pose& pose) {
     if (slot == EditList::kNone) return Error{"move: the edit is gone", ErrorKind::Usage};
     const auto found = m.mover_of.find(slot);
     if (found == m.mover_of.end())
-        return Error{m.edits[slot].edit->name +
-                         ": only bodies and dynamic edits are moved; make it dynamic, or change the edit",
-                     ErrorKind::Usage};
+        return Error{
+            m.edits[slot].edit->name + ": only bodies and dynamic edits are moved; make it dynamic, or change the edit",
+            ErrorKind::Usage};
     const quat q = pose.rotation;
     const float size = std::sqrt(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w);
     const vec3 p = pose.position;

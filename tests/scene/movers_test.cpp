@@ -32,7 +32,8 @@ EditId id_of(const World& world, std::string_view name) {
     return id.value_or(EditId{});
 }
 
-const char* const kField = R"("format": 1, "field": {"voxel_size": 0.05, "bounds": {"min": [-3, -2, -3], "max": [3, 3, 3]}})";
+const char* const kField =
+    R"("format": 1, "field": {"voxel_size": 0.05, "bounds": {"min": [-3, -2, -3], "max": [3, 3, 3]}})";
 
 TEST(Movers, BodiesLeaveTheListAndAreSeenWhereTheyStartAsHardUnions) {
     const std::string edits = R"("edits": [
@@ -40,8 +41,8 @@ TEST(Movers, BodiesLeaveTheListAndAreSeenWhereTheyStartAsHardUnions) {
         {"id": "rock", "shape": "sphere", "radius": 0.5, "position": [0, 0.5, 0], "blend_radius": 0.3},
         {"id": "hole", "shape": "box", "half_extents": [0.2, 2, 0.2], "op": "subtract", "position": [0, 0.6, 0.3]},
         {"id": "cut", "shape": "sphere", "radius": 0.7, "position": [0.8, 0, 0], "op": "subtract", "blend_radius": 0.1}])";
-    const World world = parsed(std::string("{") + kField + "," + edits +
-                               R"(, "bodies": [{"id": "b", "edits": ["rock", "hole"]}]})");
+    const World world =
+        parsed(std::string("{") + kField + "," + edits + R"(, "bodies": [{"id": "b", "edits": ["rock", "hole"]}]})");
     const World ground = parsed(std::string("{") + kField + R"(, "edits": [
         {"id": "ground", "shape": "sphere", "radius": 1.2, "position": [0, -1, 0]},
         {"id": "cut", "shape": "sphere", "radius": 0.7, "position": [0.8, 0, 0], "op": "subtract", "blend_radius": 0.1}]})");
@@ -82,12 +83,13 @@ std::string random_edits(uint32_t seed, bool dynamic) {
         const bool hard = any(random) < 0.7f;
         const float kind = any(random);
         const char* const op = kind < 0.75f ? "union" : kind < 0.9f ? "subtract" : "paint";
-        std::snprintf(text, sizeof text,
-                      R"(, {"id": "e%d", "shape": "box", "half_extents": [%.3f, %.3f, %.3f], "position": [%.3f, %.3f, %.3f],
+        std::snprintf(
+            text, sizeof text,
+            R"(, {"id": "e%d", "shape": "box", "half_extents": [%.3f, %.3f, %.3f], "position": [%.3f, %.3f, %.3f],
                          "rotation": [0, %.4f, 0, %.4f], "op": "%s", "blend_radius": %.2f, "material": "m"%s})",
-                      i, double(size(random)), double(size(random)), double(size(random)), double(in(random)),
-                      double(in(random)), double(in(random)), std::sin(double(i)), std::cos(double(i)), op,
-                      hard ? 0.0 : 0.2, dynamic && i % 2 == 0 ? R"(, "dynamic": true)" : "");
+            i, double(size(random)), double(size(random)), double(size(random)), double(in(random)), double(in(random)),
+            double(in(random)), std::sin(double(i)), std::cos(double(i)), op, hard ? 0.0 : 0.2,
+            dynamic && i % 2 == 0 ? R"(, "dynamic": true)" : "");
         out += text;
     }
     return out + "]";
@@ -114,7 +116,7 @@ TEST(Movers, DynamicIsAHintThatNeverChangesAnAnswer) {
             }
         }
         for (int i = 0; i < 200; ++i) {
-            const Ray ray{.origin = {in(random), 2.5f, in(random)}, .direction = normalize({in(random) * 0.2f, -1, 0})};
+            const Ray ray{.origin = {in(random), 2.5f, in(random)}, .direction = normalize({in(random)*0.2f, -1, 0})};
             const RayHit a = still.cast(ray), b = world.cast(ray);
             ASSERT_EQ(a.hit, b.hit);
             EXPECT_NEAR(a.t, b.t, 1e-4f);
@@ -124,11 +126,12 @@ TEST(Movers, DynamicIsAHintThatNeverChangesAnAnswer) {
     EXPECT_GT(within, 15);
 }
 
-const char* const kLump = R"({"id": "lump", "shape": "box", "half_extents": [0.3, 0.2, 0.4], "position": [0, 0.5, 0], "dynamic": true)";
+const char* const kLump =
+    R"({"id": "lump", "shape": "box", "half_extents": [0.3, 0.2, 0.4], "position": [0, 0.5, 0], "dynamic": true)";
 
 TEST(Movers, MovingOneThatStandsApartBakesNothing) {
-    World world = parsed(std::string("{") + kField + R"(, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )" +
-                         kLump + "}]}");
+    World world = parsed(std::string("{") + kField +
+                         R"(, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )" + kLump + "}]}");
     auto before = world.frame();
     ASSERT_TRUE(before);
     ASSERT_EQ(before->instances.size(), 1u);
@@ -181,8 +184,8 @@ TEST(Movers, OneThatBlendsRebakesWhereItWasAndWhereItIs) {
 }
 
 TEST(Movers, StandApartOnlyWhileNothingLaterChangesThem) {
-    World world = parsed(std::string("{") + kField + R"(, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )" +
-                         kLump + "}]}");
+    World world = parsed(std::string("{") + kField +
+                         R"(, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )" + kLump + "}]}");
     const auto count = [&] { return world.frame()->instances.size(); };
     EXPECT_EQ(count(), 1u);
     Edit cut;
@@ -221,7 +224,8 @@ TEST(Movers, StandApartOnlyWhileNothingLaterChangesThem) {
 }
 
 TEST(Movers, EqualObjectsShareOneSetAndDifferByMaterial) {
-    const World world = parsed(std::string("{") + kField + R"(, "materials": {"red": {"base_color": [1, 0, 0]}, "blue": {}},
+    const World world =
+        parsed(std::string("{") + kField + R"(, "materials": {"red": {"base_color": [1, 0, 0]}, "blue": {}},
         "objects": {"nut": {"op": "subtract", "children": [{"shape": "box", "half_extents": [0.3, 0.1, 0.3]}, {"shape": "cylinder", "half_height": 1, "radius": 0.1}]}},
         "edits": [{"id": "a", "object": "nut", "position": [1, 0, 0], "material": "red", "dynamic": true},
                   {"id": "b", "object": "nut", "position": [-1, 0, 0], "rotation": [0, 0, 1, 0], "material": "blue", "dynamic": true},
@@ -240,8 +244,10 @@ TEST(Movers, EqualObjectsShareOneSetAndDifferByMaterial) {
 }
 
 TEST(Movers, OfLevelsToo) {
-    World world = parsed(std::string(R"({"format": 1, "field": {"voxel_size": 0.05, "levels": 3, "cells": 32}, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )") +
-                         kLump + "}]}");
+    World world = parsed(
+        std::string(
+            R"({"format": 1, "field": {"voxel_size": 0.05, "levels": 3, "cells": 32}, "edits": [{"id": "g", "shape": "plane", "position": [0, -1, 0]}, )") +
+        kLump + "}]}");
     auto frame = world.frame(Camera{.position = {0, 1, 2}});
     ASSERT_TRUE(frame);
     ASSERT_EQ(frame->instances.size(), 1u);
