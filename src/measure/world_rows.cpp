@@ -23,9 +23,9 @@ namespace {
 constexpr double kFrame = 1.0 / 60;
 constexpr float kFinest = 0.02f;
 constexpr int kLevels = 6;
-constexpr uint32_t kBudget = 1024;    // bricks a frame
-constexpr float kSpacing = 4;         // metres between edits, more or less
-constexpr float kSize = 3;            // of the recipe's edits, which are made for a box of two metres
+constexpr uint32_t kBudget = 1024;  // bricks a frame
+constexpr float kSpacing = 4;       // metres between edits, more or less
+constexpr float kSize = 3;          // of the recipe's edits, which are made for a box of two metres
 constexpr int kFlown = 240, kFast = 60, kTeleports = 3, kDug = 60, kMoved = 1000;
 
 // Ground, and edits all over a square.
@@ -141,8 +141,8 @@ private:
         if (!fresh) return run_.fail(fresh.error());
         fresh->work();
         if (flight.most_cells > 0)
-            return run_.fail(Error{formatted("bench world/{}: {} cells were made that had not entered", name,
-                                             flight.most_cells)});
+            return run_.fail(
+                Error{formatted("bench world/{}: {} cells were made that had not entered", name, flight.most_cells)});
         const uint64_t was = hash_of(map, *fresh), is = hash_of(*fresh, map);
         run_.add_checked(row(name + ".mean", flight.mean_ms, "ms"), was, is);
         run_.add_checked(row(name + ".worst", flight.worst_ms, "ms"), was, is);
@@ -231,7 +231,8 @@ private:
 
 BenchFamily world_family() {
     return {{"world",
-             "a world of six levels flown through at 60 Hz: milliseconds and bricks a frame, the worst frame, memory; digging; a thousand "
+             "a world of six levels flown through at 60 Hz: milliseconds and bricks a frame, the worst frame, memory; "
+             "digging; a thousand "
              "things moving",
              {"fly", "fast", "teleport", "dig", "move.1000"}},
             [](BenchRun& run) { WorldRows(run).all(); }};

@@ -44,12 +44,18 @@ void main() {
         int steps = 0;
         uint at = 0u;
         while (at < push.node_count) {
-            InstanceNode node = nodes[at];
-            steps++;
-            bool meets = walk_meets(node, from, inverse, nearest);
-            at = meets ? at + 1u : node.skip;
-            if (!meets || node.instance == kNoInstance) continue;
-            InstanceRecord instance = instances[node.instance];
+            // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray
+            // Traversal on GPUs", 2009).
+            uint found = kNoInstance;
+            while (at < push.node_count && found == kNoInstance) {
+                InstanceNode node = nodes[at];
+                steps++;
+                bool meets = walk_meets(node, from, inverse, nearest);
+                at = meets ? at + 1u : node.skip;
+                if (meets) found = node.instance;
+            }
+            if (found == kNoInstance) break;
+            InstanceRecord instance = instances[found];
             here = sets[instance.set];
             // A little beyond the nearest, so that of equals the lower number is found.
             float t_end = nearest < kFarVoxels ? nearest * instance.voxels * 1.000001 : kFarVoxels;
@@ -58,12 +64,12 @@ void main() {
             voxels += hit.voxels;
             if (hit.state == kMarchMiss) continue;
             float t = hit.t / instance.voxels;
-            if (t < nearest || (t == nearest && node.instance < nearest_instance && nearest_instance != kNoInstance)) {
+            if (t < nearest || (t == nearest && found < nearest_instance && nearest_instance != kNoInstance)) {
                 nearest = t;
-                nearest_instance = node.instance;
+                nearest_instance = found;
                 bool inside = hit.state != kMarchHit;
                 seen.x = floatBitsToUint(t);
-                seen.y = inside ? kSeenInside << 28u : (kSeenInstance << 28u) | node.instance;
+                seen.y = inside ? kSeenInside << 28u : (kSeenInstance << 28u) | found;
                 seen.z = inside ? 0u : uint(hit.voxel.x | (hit.voxel.y << 3) | (hit.voxel.z << 6)) | (uint(hit.slot) << kInstanceSlotShift);
             }
         }

@@ -74,22 +74,29 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
     float visible = 1.0;
     uint at = 0u;
     while (at < push.node_count) {
-        InstanceNode node = nodes[at];
-        bool meets = walk_meets(node, p, inverse, t_last);
-        vec3 low = vec3(node.low_x, node.low_y, node.low_z);
-        vec3 high = vec3(node.high_x, node.high_y, node.high_z);
-        vec3 middle = 0.5 * (low + high) - p;
-        float radius = 0.5 * length(high - low);
-        float along = dot(middle, l);
-        if (!meets && tan_radius > 0.0) {
-            // The cone against the ball around the box.
-            vec3 across = middle - l * along;
-            float reach = radius + max(along + radius, 0.0) * tan_radius;
-            meets = dot(across, across) <= reach * reach && along + radius >= 0.0 && along - radius <= t_last;
+        uint found = kNoInstance;
+        float radius = 0.0;
+        float along = 0.0;
+        // To the next leaf first, as in march_instances.comp.
+        while (at < push.node_count && found == kNoInstance) {
+            InstanceNode node = nodes[at];
+            bool meets = walk_meets(node, p, inverse, t_last);
+            vec3 low = vec3(node.low_x, node.low_y, node.low_z);
+            vec3 high = vec3(node.high_x, node.high_y, node.high_z);
+            vec3 middle = 0.5 * (low + high) - p;
+            radius = 0.5 * length(high - low);
+            along = dot(middle, l);
+            if (!meets && tan_radius > 0.0) {
+                // The cone against the ball around the box.
+                vec3 across = middle - l * along;
+                float reach = radius + max(along + radius, 0.0) * tan_radius;
+                meets = dot(across, across) <= reach * reach && along + radius >= 0.0 && along - radius <= t_last;
+            }
+            at = meets ? at + 1u : node.skip;
+            if (meets) found = node.instance;
         }
-        at = meets ? at + 1u : node.skip;
-        if (!meets || node.instance == kNoInstance) continue;
-        InstanceRecord instance = instances[node.instance];
+        if (found == kNoInstance) break;
+        InstanceRecord instance = instances[found];
         here = sets[instance.set];
         TexelRay ray = object_ray(instance, p, l);
         float scale = instance.voxels;
