@@ -106,7 +106,8 @@ private:
     }
 
     bool split() {
-        static constexpr std::string_view kPairs[] = {"==", "!=", "<=", ">=", "&&", "||", "^^", "++", "--", "+=", "-=", "*=", "/="};
+        static constexpr std::string_view kPairs[] = {"==", "!=", "<=", ">=", "&&", "||", "^^",
+                                                      "++", "--", "+=", "-=", "*=", "/="};
         const auto letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
         const auto digit = [](char c) { return c >= '0' && c <= '9'; };
         size_t i = 0;
@@ -224,7 +225,8 @@ private:
             const size_t place = now().place;
             const auto type = type_here();
             if (!type) {
-                return fail_here(formatted("{} begins no function; write one such as float shape(vec3 p) {{ … }}", seen(now())));
+                return fail_here(
+                    formatted("{} begins no function; write one such as float shape(vec3 p) {{ … }}", seen(now())));
             }
             ++at_;
             std::string_view what;
@@ -277,12 +279,13 @@ private:
         };
         const auto found = std::find_if(functions_.rbegin(), functions_.rend(), fits);
         if (found == functions_.rend())
-            return fail(text_.size(), "no function takes a point and returns a distance; write float shape(vec3 p) { … }");
+            return fail(text_.size(),
+                        "no function takes a point and returns a distance; write float shape(vec3 p) { … }");
         const Function& f = *found;
         const size_t place = tokens_[f.body].place;
         if (f.parameters.size() != 1 + arguments_.size()) {
-            return fail(place, formatted("{} has {} parameters after the point; {} are given", f.name, f.parameters.size() - 1,
-                                         arguments_.size()));
+            return fail(place, formatted("{} has {} parameters after the point; {} are given", f.name,
+                                         f.parameters.size() - 1, arguments_.size()));
         }
         std::vector<Value> in{{Type::Vec3, {build_.variable(Fn::X), build_.variable(Fn::Y), build_.variable(Fn::Z)}}};
         for (size_t i = 0; i < arguments_.size(); ++i) {
@@ -321,7 +324,8 @@ private:
     uint32_t choose(uint32_t condition, uint32_t yes, uint32_t other) {
         if (const auto n = known(condition)) return *n != 0 ? yes : other;
         if (yes == other) return yes;
-        return build_.binary(Fn::Add, build_.binary(Fn::Mul, yes, condition), build_.binary(Fn::Mul, other, no(condition)));
+        return build_.binary(Fn::Add, build_.binary(Fn::Mul, yes, condition),
+                             build_.binary(Fn::Mul, other, no(condition)));
     }
     Value choose(uint32_t condition, const Value& yes, const Value& other) {
         Value out = yes;
@@ -348,7 +352,8 @@ private:
     };
 
     bool call(const Function& f, const std::vector<Value>& in, std::vector<Value>& back, size_t place, Value& out) {
-        if (depth_ >= kMostCalls) return fail(place, formatted("{} calls itself, or calls go too deep; inline them", f.name));
+        if (depth_ >= kMostCalls)
+            return fail(place, formatted("{} calls itself, or calls go too deep; inline them", f.name));
         if (!step(place)) return false;
         ++depth_;
         const size_t from = at_, scope = variables_.size();
@@ -375,7 +380,8 @@ private:
     }
 
     bool fits(size_t place) {
-        if (build_.full()) return fail(place, formatted("more than {} operations; use a smaller function", kMaxFormulaNodes));
+        if (build_.full())
+            return fail(place, formatted("more than {} operations; use a smaller function", kMaxFormulaNodes));
         if (build_.not_finite())
             return fail(place, "this comes to no finite number (a division by 0?); change its constants");
         return true;
@@ -431,7 +437,8 @@ private:
         if (take("const")) {
             skip_precision();
             const auto type = type_here();
-            if (!type || *type == Type::Void) return fail_here(formatted("{} is no type; use float, vec3 and the like", seen(now())));
+            if (!type || *type == Type::Void)
+                return fail_here(formatted("{} is no type; use float, vec3 and the like", seen(now())));
             ++at_;
             return declarations(*type, true);
         }
@@ -535,7 +542,9 @@ private:
             uint32_t condition = k(1);
             if (!is(";") && !truth(condition)) return false;
             const auto goes_on = known(condition);
-            if (!goes_on) return fail(tokens_[condition_at].place, "how often this loop runs depends on the point; bound it by a constant and break");
+            if (!goes_on)
+                return fail(tokens_[condition_at].place,
+                            "how often this loop runs depends on the point; bound it by a constant and break");
             at_ = step_at;
             int depth = 0;
             for (; depth > 0 || !is(")"); ++at_) {
@@ -710,8 +719,8 @@ private:
             if (is_number(yes.type) && is_number(other.type)) {
                 yes.type = other.type = Type::Float;
             } else {
-                return fail(place, formatted("one side of ?: is a {}, the other a {}; make them the same", named(yes.type),
-                                             named(other.type)));
+                return fail(place, formatted("one side of ?: is a {}, the other a {}; make them the same",
+                                             named(yes.type), named(other.type)));
             }
         }
         out = choose(out.at[0], yes, other);
@@ -738,7 +747,8 @@ private:
             ++at_;
             Value right;
             if (!binary(right, binds)) return false;
-            if (binds <= 5 ? !compare(op.text, out, right, op.place) : !arithmetic(op.text[0], out, right, op.place)) return false;
+            if (binds <= 5 ? !compare(op.text, out, right, op.place) : !arithmetic(op.text[0], out, right, op.place))
+                return false;
         }
     }
     bool compare(std::string_view op, Value& a, const Value& b, size_t place) {
@@ -760,7 +770,10 @@ private:
         }
         if (!is_number(a.type)) return fail(place, formatted("{} compares numbers; take one component", op));
         const uint32_t u = a.at[0], v = b.at[0];
-        a = {Type::Bool, {op == ">=" ? reaches(u, v) : op == "<=" ? reaches(v, u) : no(op == ">" ? reaches(v, u) : reaches(u, v))}};
+        a = {Type::Bool,
+             {op == ">="   ? reaches(u, v)
+              : op == "<=" ? reaches(v, u)
+                           : no(op == ">" ? reaches(v, u) : reaches(u, v))}};
         return fits(place);
     }
 
@@ -796,7 +809,8 @@ private:
             a.at[i] = build_.binary(fn, a.at[i], b.at[i]);
             if (!whole || fn != Fn::Div) continue;
             const auto quotient = known(a.at[i]);
-            if (!quotient) return fail(place, "whole numbers that depend on the point cannot be divided; make them floats");
+            if (!quotient)
+                return fail(place, "whole numbers that depend on the point cannot be divided; make them floats");
             a.at[i] = k(std::trunc(*quotient));
         }
         return fits(place);
@@ -804,7 +818,8 @@ private:
     bool multiply(Value& a, const Value& b, size_t place) {
         const int n = is_matrix(a.type) ? facts(a.type).columns : facts(b.type).columns;
         const int rows_a = is_matrix(a.type) ? n : 1, columns_b = is_matrix(b.type) ? n : 1;
-        if ((is_matrix(a.type) ? facts(a.type).columns : a.size()) != n || (is_matrix(b.type) ? facts(b.type).columns : b.size()) != n)
+        if ((is_matrix(a.type) ? facts(a.type).columns : a.size()) != n ||
+            (is_matrix(b.type) ? facts(b.type).columns : b.size()) != n)
             return fail(place, formatted("a {} times a {}; make their sizes meet", named(a.type), named(b.type)));
         Value out{is_matrix(a.type) && is_matrix(b.type) ? a.type : vector_of(n), {}};
         for (int c = 0; c < columns_b; ++c) {
@@ -814,7 +829,8 @@ private:
                     row[size_t(i)] = a.at[size_t(is_matrix(a.type) ? i * n + r : i)];
                     column[size_t(i)] = b.at[size_t(c * n + i)];
                 }
-                out.at[size_t(c * rows_a + r)] = build_.dot(std::span(row).first(size_t(n)), std::span(column).first(size_t(n)));
+                out.at[size_t(c * rows_a + r)] =
+                    build_.dot(std::span(row).first(size_t(n)), std::span(column).first(size_t(n)));
             }
         }
         a = out;
@@ -833,8 +849,10 @@ private:
             out.at[0] = no(out.at[0]);
             return true;
         }
-        if (out.type == Type::Bool || out.type == Type::Void) return fail(op.place, "this is no number; take the sign out");
-        for (size_t i = 0; op.text == "-" && i < size_t(out.size()); ++i) out.at[i] = build_.unary(Fn::Negate, out.at[i]);
+        if (out.type == Type::Bool || out.type == Type::Void)
+            return fail(op.place, "this is no number; take the sign out");
+        for (size_t i = 0; op.text == "-" && i < size_t(out.size()); ++i)
+            out.at[i] = build_.unary(Fn::Negate, out.at[i]);
         return true;
     }
 
@@ -860,7 +878,8 @@ private:
             if (!expression(index) || !need("]")) return false;
             const auto n = is_number(index.type) ? known(index.at[0]) : std::nullopt;
             const int count = is_matrix(of) ? facts(of).columns : is_vector(of) ? facts(of).size : 0;
-            if (count == 0) return fail(open.place, formatted("a {} has no components; take the brackets out", named(of)));
+            if (count == 0)
+                return fail(open.place, formatted("a {} has no components; take the brackets out", named(of)));
             if (!n || *n < 0 || *n >= count)
                 return fail(place, formatted("a component's number is a constant, 0 to {}", count - 1));
             type = is_matrix(of) ? vector_of(count) : Type::Float;
@@ -869,7 +888,8 @@ private:
         }
         std::string_view letters;
         if (!name(letters)) return false;
-        if (!is_vector(of)) return fail(open.place, formatted(".{} of a {}; only vectors have components", letters, named(of)));
+        if (!is_vector(of))
+            return fail(open.place, formatted(".{} of a {}; only vectors have components", letters, named(of)));
         if (letters.size() > 4) return fail(open.place, "one to four components follow a dot; write for example p.xz");
         for (size_t i = 0; i < letters.size(); ++i) {
             size_t n = std::string_view("xyzw").find(letters[i]);
@@ -893,7 +913,8 @@ private:
             return true;
         }
         if (take("(")) return expression(out) && need(")");
-        if (t.kind != Token::Kind::Name) return fail_here(formatted("a value is missing before {}; write one, such as p.x", seen(t)));
+        if (t.kind != Token::Kind::Name)
+            return fail_here(formatted("a value is missing before {}; write one, such as p.x", seen(t)));
         if (t.text == "true" || t.text == "false") {
             ++at_;
             out = {Type::Bool, {k(t.text == "true" ? 1 : 0)}};
@@ -921,8 +942,8 @@ private:
             if (now().kind == Token::Kind::Name && tokens_[at_ + 1].text != "(") {
                 const Variable* const v = find(now().text);
                 Target t;
-                if (v != nullptr && !v->constant && v >= variables_.data() && v < variables_.data() + variables_.size() && target(t) &&
-                    (is(",") || is(")")))
+                if (v != nullptr && !v->constant && v >= variables_.data() &&
+                    v < variables_.data() + variables_.size() && target(t) && (is(",") || is(")")))
                     to = t;
                 error_.clear();
                 at_ = from;
@@ -941,12 +962,14 @@ private:
             if (f.parameters.size() != in.size()) continue;
             bool same = true;
             for (size_t i = 0; i < in.size(); ++i)
-                same = same && (in[i].type == f.parameters[i].type || (in[i].type == Type::Int && f.parameters[i].type == Type::Float));
+                same = same && (in[i].type == f.parameters[i].type ||
+                                (in[i].type == Type::Int && f.parameters[i].type == Type::Float));
             if (!same) continue;
             for (size_t i = 0; i < in.size(); ++i) {
                 in[i].type = f.parameters[i].type;
                 if (f.parameters[i].out && !targets[i])
-                    return fail(what.place, formatted("{} writes to its operand {}; give it a variable", f.name, i + 1));
+                    return fail(what.place,
+                                formatted("{} writes to its operand {}; give it a variable", f.name, i + 1));
             }
             std::vector<Value> back;
             const Function copy = f;  // functions_ stays as it is; the call may not move it
@@ -969,13 +992,15 @@ private:
         if (in.empty() || size == 0) return fail(place, formatted("{} of nothing; give it numbers", named(type)));
         if (size == 1) {
             const uint32_t v = in[0].at[0];
-            if (in.size() != 1 || is_matrix(in[0].type)) return fail(place, formatted("{} takes one number", named(type)));
+            if (in.size() != 1 || is_matrix(in[0].type))
+                return fail(place, formatted("{} takes one number", named(type)));
             out.at[0] = v;
             if (type == Type::Int && in[0].type == Type::Float) {
                 const uint32_t down = build_.unary(Fn::Floor, build_.unary(Fn::Abs, v));  // towards 0
                 out.at[0] = choose(reaches(v, k(0)), down, build_.unary(Fn::Negate, down));
             }
-            if (type == Type::Bool && in[0].type != Type::Bool) out.at[0] = no(both(reaches(v, k(0)), reaches(k(0), v)));
+            if (type == Type::Bool && in[0].type != Type::Bool)
+                out.at[0] = no(both(reaches(v, k(0)), reaches(k(0), v)));
             return true;
         }
         if (in.size() == 1 && in[0].size() == 1) {
@@ -987,7 +1012,8 @@ private:
             const int n = facts(type).columns, from = facts(in[0].type).columns;
             for (int c = 0; c < n; ++c)
                 for (int r = 0; r < n; ++r)
-                    out.at[size_t(c * n + r)] = c < from && r < from ? in[0].at[size_t(c * from + r)] : k(c == r ? 1 : 0);
+                    out.at[size_t(c * n + r)] =
+                        c < from && r < from ? in[0].at[size_t(c * from + r)] : k(c == r ? 1 : 0);
             return true;
         }
         size_t filled = 0;
@@ -1004,10 +1030,12 @@ private:
         Builder& b = build_;
         const size_t n = in.size(), place = what.place;
         const auto takes = [&](size_t count) {
-            return n == count || fail(place, formatted("{} has {} operand{} here; it takes {}", f, n, n == 1 ? "" : "s", count));
+            return n == count ||
+                   fail(place, formatted("{} has {} operand{} here; it takes {}", f, n, n == 1 ? "" : "s", count));
         };
         for (Value& v : in) {
-            if (v.type == Type::Bool && f != "mix" && f != "not") return fail(place, formatted("{} of a condition; give it numbers", f));
+            if (v.type == Type::Bool && f != "mix" && f != "not")
+                return fail(place, formatted("{} of a condition; give it numbers", f));
             if (is_matrix(v.type) && f != "transpose" && f != "determinant")
                 return fail(place, formatted("{} of a matrix; give it its columns", f));
         }
@@ -1035,12 +1063,8 @@ private:
             for (size_t i = 0; i < size_t(out.size()); ++i) out.at[i] = fn(in[0].at[i], in[1].at[i], in[2].at[i]);
             return fits(place);
         };
-        const auto one = [&](Fn fn) {
-            return each([&, fn](uint32_t v) { return b.unary(fn, v); });
-        };
-        const auto two = [&](Fn fn) {
-            return each2([&, fn](uint32_t u, uint32_t v) { return b.binary(fn, u, v); });
-        };
+        const auto one = [&](Fn fn) { return each([&, fn](uint32_t v) { return b.unary(fn, v); }); };
+        const auto two = [&](Fn fn) { return each2([&, fn](uint32_t u, uint32_t v) { return b.binary(fn, u, v); }); };
         const auto scaled = [&](Fn fn, double by) {
             return each([&, fn, by](uint32_t v) { return b.unary(fn, b.binary(Fn::Mul, v, k(by))); });
         };
@@ -1069,8 +1093,7 @@ private:
                 return choose(reaches(v, k(0)), down, b.unary(Fn::Negate, down));
             });
         }
-        if (f == "sign")
-            return each([&](uint32_t v) { return b.binary(Fn::Sub, reaches(v, k(0)), reaches(k(0), v)); });
+        if (f == "sign") return each([&](uint32_t v) { return b.binary(Fn::Sub, reaches(v, k(0)), reaches(k(0), v)); });
         if (f == "atan") {
             if (n == 2) return two(Fn::Atan2);
             return each([&](uint32_t v) { return b.binary(Fn::Atan2, v, k(1)); });
@@ -1081,7 +1104,8 @@ private:
         if (f == "pow") return each2([&](uint32_t u, uint32_t v) { return b.power(u, v); });
         if (f == "step") return each2([&](uint32_t edge, uint32_t v) { return reaches(v, edge); });
         if (f == "clamp") return each3([&](uint32_t v, uint32_t low, uint32_t high) { return b.clamp(v, low, high); });
-        if (f == "smoothstep") return each3([&](uint32_t low, uint32_t high, uint32_t v) { return b.smoothstep(low, high, v); });
+        if (f == "smoothstep")
+            return each3([&](uint32_t low, uint32_t high, uint32_t v) { return b.smoothstep(low, high, v); });
         if (f == "mix") {
             if (n == 3 && in[2].type == Type::Bool) {
                 if (!match(in[0], in[1], place)) return false;
@@ -1119,9 +1143,11 @@ private:
         }
         if (f == "cross") {
             if (!takes(2)) return false;
-            if (in[0].type != Type::Vec3 || in[1].type != Type::Vec3) return fail(place, "cross takes two vec3; make them so");
+            if (in[0].type != Type::Vec3 || in[1].type != Type::Vec3)
+                return fail(place, "cross takes two vec3; make them so");
             const auto minor = [&](size_t i, size_t j) {
-                return b.binary(Fn::Sub, b.binary(Fn::Mul, in[0].at[i], in[1].at[j]), b.binary(Fn::Mul, in[0].at[j], in[1].at[i]));
+                return b.binary(Fn::Sub, b.binary(Fn::Mul, in[0].at[i], in[1].at[j]),
+                                b.binary(Fn::Mul, in[0].at[j], in[1].at[i]));
             };
             out = {Type::Vec3, {minor(1, 2), minor(2, 0), minor(0, 1)}};
             return fits(place);
@@ -1167,6 +1193,8 @@ private:
 
 }  // namespace
 
-Result<Formula> read_glsl(std::string_view text, std::span<const float> arguments) { return Reader(text, arguments).run(); }
+Result<Formula> read_glsl(std::string_view text, std::span<const float> arguments) {
+    return Reader(text, arguments).run();
+}
 
 }  // namespace kiln::sdf

@@ -120,7 +120,14 @@ TEST(InstancePicturesGpu, RaysMeetWhatRaysThroughHostBricksMeet) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP();
     Pair pair = pair_of(field::worlds::blends());
-    const Frame& frame = pair.instances;
+    Frame& frame = pair.instances;
+    // Some before the world, and before each other, whatever their order in the list.
+    const vec3 eye = frame.camera.position;
+    for (const float share : {0.5f, 0.35f, 0.6f}) {
+        Instance i = frame.instances[size_t(share * 8)];
+        i.pose.position = eye * share + vec3{0.05f, 0.04f, 0} * share;
+        frame.instances.push_back(i);
+    }
     const RenderSettings settings{.width = 96, .height = 72, .view = View::Depth, .refine = false};
     for (const bool accelerate : {true, false}) {
         RenderSettings s = settings;
@@ -133,7 +140,6 @@ TEST(InstancePicturesGpu, RaysMeetWhatRaysThroughHostBricksMeet) {
         for (int y = 0; y < s.height; ++y) {
             for (int x = 0; x < s.width; ++x) {
                 const vec3 d = shade::camera_direction_at(camera, float(x) + 0.5f, float(y) + 0.5f);
-                const vec3 eye = frame.camera.position;
                 const auto cast = [&](const field::HostBricks& bricks, vec3 o, vec3 way) {
                     const auto hit = bricks.cast({double(o.x), double(o.y), double(o.z)}, way, 1e9);
                     return hit.state == field::kMarchMiss ? 1e30 : hit.t;
@@ -193,7 +199,11 @@ TEST(InstancePicturesGpu, MovingBakesNothingAndWhatIsBehindIsSeenAgain) {
         {.bricks = set_of({edit(Sphere{.radius = 0.3f})}, 0.04f), .pose = {{0, 1, 1}, {}}, .before = {}}};
     ASSERT_TRUE(renderer->render(frame, settings));
     EXPECT_GT(renderer->stats().instance_bricks_new, 0u);
-    ASSERT_TRUE(renderer->render(frame_of(field::worlds::jumble()), settings));
+    field::worlds::World fine = on_ground();
+    fine.options.voxel_size = 0.012f;
+    const uint64_t atlas = renderer->stats().atlas_bytes;
+    ASSERT_TRUE(renderer->render(frame_of(fine), settings));
+    EXPECT_GT(renderer->stats().atlas_bytes, atlas);
     back = renderer->render(pair.instances, settings);
     ASSERT_TRUE(back);
     EXPECT_EQ(back->srgb, first->srgb);

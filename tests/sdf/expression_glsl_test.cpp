@@ -44,9 +44,12 @@ const Twin kTwins[] = {
          return std::sqrt(out) + std::min(std::max({q[0], q[1], q[2]}), 0.0);
      }},
     {"ternary", "float f(vec3 p) { return p.x < 0.5 ? p.y : p.x >= 0.75 && p.z != p.y ? 2.0 : p.z; }",
-     [](double x, double y, double z) { return x < 0.5 ? y : x >= 0.75 && z != y ? 2 : z; }},
+     [](double x, double y, double z) { return x < 0.5               ? y
+                                               : x >= 0.75 && z != y ? 2
+                                                                     : z; }},
     {"early_return",
-     "float f(vec3 p) { float d = p.x; if (p.y > 0.0) { d += 1.0; if (p.z > 0.0) return d; d *= 2.0; } else d = -d; return d - p.z; }",
+     "float f(vec3 p) { float d = p.x; if (p.y > 0.0) { d += 1.0; if (p.z > 0.0) return d; d *= 2.0; } else d = -d; "
+     "return d - p.z; }",
      [](double x, double y, double z) {
          double d = x;
          if (y > 0) {
@@ -59,7 +62,8 @@ const Twin kTwins[] = {
          return d - z;
      }},
     {"loops",
-     "float f(vec3 p) { float sum = 0.; for (int i = 0; i < 5; i++) { if (i == 1) continue; for (int j = i; j > 0; --j) sum += p.y; "
+     "float f(vec3 p) { float sum = 0.; for (int i = 0; i < 5; i++) { if (i == 1) continue; for (int j = i; j > 0; "
+     "--j) sum += p.y; "
      "if (sum > 3.0) break; sum += p.x * float(i); } return sum; }",
      [](double x, double y, double) {
          double sum = 0;
@@ -72,14 +76,16 @@ const Twin kTwins[] = {
          return sum;
      }},
     {"return_in_loop",
-     "float f(vec3 p) { for (int i = 1; i <= 4; i += 1) { if (p.x * float(i) > 1.0) return float(i) + p.y; } return -1.0; }",
+     "float f(vec3 p) { for (int i = 1; i <= 4; i += 1) { if (p.x * float(i) > 1.0) return float(i) + p.y; } return "
+     "-1.0; }",
      [](double x, double y, double) {
          for (int i = 1; i <= 4; ++i)
              if (x * i > 1) return i + y;
          return -1.0;
      }},
     {"skip_a_round",
-     "float f(vec3 p) { float s = 0.0; for (int i = 0; i < 3; i++) { if (p.z < float(i) - 1.0) continue; s += 1.0; } return s; }",
+     "float f(vec3 p) { float s = 0.0; for (int i = 0; i < 3; i++) { if (p.z < float(i) - 1.0) continue; s += 1.0; } "
+     "return s; }",
      [](double, double, double z) {
          double s = 0;
          for (int i = 0; i < 3; ++i) {
@@ -89,7 +95,8 @@ const Twin kTwins[] = {
          return s;
      }},
     {"inout",
-     "void turn(inout vec2 v, float a) { v = mat2(cos(a), sin(a), -sin(a), cos(a)) * v; if (a > 1.0) return; v.x += 10.0; }\n"
+     "void turn(inout vec2 v, float a) { v = mat2(cos(a), sin(a), -sin(a), cos(a)) * v; if (a > 1.0) return; v.x += "
+     "10.0; }\n"
      "float f(vec3 p) { turn(p.xz, 0.5); turn(p.yx, 2.0); return p.x + 2.0 * p.y + 3.0 * p.z; }",
      [](double x, double y, double z) {
          const auto turn = [](double& u, double& v, double a) {
@@ -103,39 +110,49 @@ const Twin kTwins[] = {
          return x + 2 * y + 3 * z;
      }},
     {"out_after_some_returned",
-     "void g(float a, out float b) { b = 1.0; if (a > 0.0) return; b = 2.0; }\nfloat f(vec3 p) { float b; g(p.x, b); return b; }",
+     "void g(float a, out float b) { b = 1.0; if (a > 0.0) return; b = 2.0; }\nfloat f(vec3 p) { float b; g(p.x, b); "
+     "return b; }",
      [](double x, double, double) { return x > 0 ? 1.0 : 2.0; }},
     {"overloads",
      "float dot2(vec2 v) { return dot(v, v); } float dot2(vec3 v) { return dot(v, v); }\n"
      "float f(vec3 p) { return dot2(p) - dot2(p.zx) + dot2(vec2(1)); }",
      [](double, double y, double) { return y * y + 2; }},
     {"matrices",
-     "float f(vec3 p) { mat3 m = mat3(1, 2, 3, 4, 5, 6, 7, 8, 10); vec3 a = m * p, b = p * m; mat2 n = mat2(2.0) * mat2(1, 2, 3, 4); "
+     "float f(vec3 p) { mat3 m = mat3(1, 2, 3, 4, 5, 6, 7, 8, 10); vec3 a = m * p, b = p * m; mat2 n = mat2(2.0) * "
+     "mat2(1, 2, 3, 4); "
      "return dot(a, vec3(1, 10, 100)) + b.y + n[1].x + m[2][0] + (transpose(m) * p).z; }",
      [](double x, double y, double z) {
          const double a[3] = {x + 4 * y + 7 * z, 2 * x + 5 * y + 8 * z, 3 * x + 6 * y + 10 * z};
          return a[0] + 10 * a[1] + 100 * a[2] + (4 * x + 5 * y + 6 * z) + 6 + 7 + (7 * x + 8 * y + 10 * z);
      }},
     {"functions",
-     "float f(vec3 p) { vec4 v = vec4(p, 1); v.wz = v.zw; return sign(p.x) + step(0.25, p.y) * trunc(3.0 * p.z) + mod(p.x, 0.5) + fract(v.w)"
-     " + smoothstep(-1.0, 1.0, p.y) + mix(p.x, p.y, 0.25) + clamp(p.z, -0.5, 0.5) + radians(90.0) + exp2(p.x) + atan(p.y, p.x)"
-     " + pow(abs(p.x) + 1.0, 1.5) + inversesqrt(4.0) + distance(p, p.yzx) + length(cross(p, p.zxy)) + normalize(p + 3.0).x"
+     "float f(vec3 p) { vec4 v = vec4(p, 1); v.wz = v.zw; return sign(p.x) + step(0.25, p.y) * trunc(3.0 * p.z) + "
+     "mod(p.x, 0.5) + fract(v.w)"
+     " + smoothstep(-1.0, 1.0, p.y) + mix(p.x, p.y, 0.25) + clamp(p.z, -0.5, 0.5) + radians(90.0) + exp2(p.x) + "
+     "atan(p.y, p.x)"
+     " + pow(abs(p.x) + 1.0, 1.5) + inversesqrt(4.0) + distance(p, p.yzx) + length(cross(p, p.zxy)) + normalize(p + "
+     "3.0).x"
      " + reflect(p, vec3(0, 1, 0)).y + float(int(2.5 * p.x)) + float(7 / 2) + v.b; }",
      [](double x, double y, double z) {
          const double t = std::clamp((y + 1) / 2, 0.0, 1.0);
          const double cross[3] = {y * y - z * x, z * z - x * y, x * x - y * z};
          const double size = std::sqrt((x + 3) * (x + 3) + (y + 3) * (y + 3) + (z + 3) * (z + 3));
-         return (x > 0 ? 1 : x < 0 ? -1 : 0) + (y >= 0.25 ? std::trunc(3 * z) : 0) + (x - 0.5 * std::floor(x / 0.5)) +
-                (z - std::floor(z)) + t * t * (3 - 2 * t) + (x + (y - x) * 0.25) + std::clamp(z, -0.5, 0.5) +
-                std::acos(-1.0) / 2 + std::exp2(x) + std::atan2(y, x) + std::pow(std::fabs(x) + 1, 1.5) + 0.5 +
+         return (x > 0   ? 1
+                 : x < 0 ? -1
+                         : 0) +
+                (y >= 0.25 ? std::trunc(3 * z) : 0) + (x - 0.5 * std::floor(x / 0.5)) + (z - std::floor(z)) +
+                t * t * (3 - 2 * t) + (x + (y - x) * 0.25) + std::clamp(z, -0.5, 0.5) + std::acos(-1.0) / 2 +
+                std::exp2(x) + std::atan2(y, x) + std::pow(std::fabs(x) + 1, 1.5) + 0.5 +
                 std::hypot(x - y, y - z, z - x) + std::hypot(cross[0], cross[1], cross[2]) + (x + 3) / size - y +
                 std::trunc(2.5 * x) + 3 + 1;
      }},
     {"scopes",
      "float a = 2.0;\nfloat g(float a) { { float a = 5.0; a += 1.0; } return a; }\n"
-     "float f(vec3 p) { float b = a; { float a = 3.0; b += a; } return b + g(p.x) + (true ^^ false ? 1.0 : 0.0) + (!(p.x > 9.) || false ? 4. : 0.); }",
+     "float f(vec3 p) { float b = a; { float a = 3.0; b += a; } return b + g(p.x) + (true ^^ false ? 1.0 : 0.0) + "
+     "(!(p.x > 9.) || false ? 4. : 0.); }",
      [](double x, double, double) { return 2 + 3 + x + 1 + 4; }},
-    {"the_last_that_fits", "float f(vec3 p) { return 1.0; } float g(vec3 q) { return f(q) + q.y; } vec3 h(vec3 p) { return p; }",
+    {"the_last_that_fits",
+     "float f(vec3 p) { return 1.0; } float g(vec3 q) { return f(q) + q.y; } vec3 h(vec3 p) { return p; }",
      [](double, double y, double) { return 1 + y; }},
 };
 
@@ -169,7 +186,8 @@ TEST(Glsl, ComparesAtEqualNumbersAsItSays) {
 TEST(Glsl, ConstantConditionsCostNothing) {
     const auto plain = read_glsl("float f(vec3 p) { return p.x + p.y; }");
     const auto looped = read_glsl(
-        "float f(vec3 p) { float s = p.x; for (int i = 0; i < 10; ++i) { if (i == 3) { s += p.y; break; } if (i > 7) return 1.0; } return s; }");
+        "float f(vec3 p) { float s = p.x; for (int i = 0; i < 10; ++i) { if (i == 3) { s += p.y; break; } if (i > 7) "
+        "return 1.0; } return s; }");
     ASSERT_TRUE(plain && looped) << looped.error().message;
     EXPECT_EQ(looped->nodes.size(), plain->nodes.size());
 }
@@ -187,7 +205,8 @@ const Wrong kWrong[] = {
     {"float f(vec3 p) { return p.xy.z; }", "it has no such component"},
     {"float f(vec3 p) { vec2 a = vec2(1.0); return a[2]; }", "a component's number is a constant, 0 to 1"},
     {"float f(vec3 p) {\n  int i = 1;\n  while (i > 0) {}\n  return 1.0; }", "3:3: \"while\" is not read"},
-    {"float f(vec3 p) { for (int i = 0; float(i) < p.x; i++) {} return 1.0; }", "how often this loop runs depends on the point"},
+    {"float f(vec3 p) { for (int i = 0; float(i) < p.x; i++) {} return 1.0; }",
+     "how often this loop runs depends on the point"},
     {"float f(vec3 p) { for (int i = 0; i < 1; ) {} return 1.0; }", "calls, rounds of loops and statements"},
     {"float g(vec3 p) { return g(p); } float f(vec3 p) { return g(p); }", "calls itself"},
     {"float f(vec3 p) { float d = 1.0; }", "f returns nothing"},
@@ -224,7 +243,8 @@ INSTANTIATE_TEST_SUITE_P(Glsl, EachWrongGlsl, testing::ValuesIn(kWrong));
 TEST(Glsl, AnyBytesAreReadOrRefusedWithAPlace) {
     std::mt19937 random(3);
     const auto below = [&](size_t n) { return size_t(random()) % n; };
-    const char* const words[] = {"if", "(", ")", "{", "}", ";", "for", "return", "p", ".x", "float", "vec3", "1.0", "<", "?", ":", "=", "+=", "break", "mat2", "[", "]", "-", ","};
+    const char* const words[] = {"if",  "(", ")", "{", "}", ";",  "for",   "return", "p", ".x", "float", "vec3",
+                                 "1.0", "<", "?", ":", "=", "+=", "break", "mat2",   "[", "]",  "-",     ","};
     int read = 0;
     for (int i = 0; i < 6000; ++i) {
         std::string text = kTwins[below(std::size(kTwins))].text;
@@ -250,11 +270,13 @@ TEST(Glsl, AnyBytesAreReadOrRefusedWithAPlace) {
             ++read;
             ASSERT_FALSE(formula->nodes.empty());
         } else {
-            ASSERT_TRUE(std::regex_search(formula.error().message, std::regex("^[0-9]+:[0-9]+: "))) << formula.error().message;
+            ASSERT_TRUE(std::regex_search(formula.error().message, std::regex("^[0-9]+:[0-9]+: ")))
+                << formula.error().message;
         }
     }
     EXPECT_GT(read, 30);
-    const std::string deep = "float f(vec3 p) { return " + std::string(100000, '(') + "1.0" + std::string(100000, ')') + "; }";
+    const std::string deep =
+        "float f(vec3 p) { return " + std::string(100000, '(') + "1.0" + std::string(100000, ')') + "; }";
     EXPECT_THAT(read_glsl(deep).error().message, testing::HasSubstr("nested too deeply"));
     const std::string signs = "float f(vec3 p) { return " + std::string(100000, '-') + "1.0; }";
     EXPECT_FALSE(read_glsl(signs));
@@ -291,7 +313,10 @@ TEST(Glsl, IsAShapeWhoseTapeIsTheJudges) {
 TEST(Glsl, IsAShapeOfTheProgramsOwnWithParameters) {
     auto made = register_shape({.name = "test_glsl_ball",
                                 .parameters = {{.name = "radius", .value = 0.5f, .least = 0.01f, .most = 10}},
-                                .half_extents = [](const float* w) { return vec3{1, 1, 1} * (1.5f * w[0]); },
+                                .half_extents =
+                                    [](const float* w) {
+                                        return vec3{1, 1, 1} * (1.5f * w[0]);
+                                    },
                                 .glsl = "float ball(vec3 p, float radius) { return length(p) - radius; }"});
     ASSERT_TRUE(made) << made.error().message;
     std::vector<Edit> edits(2);
