@@ -124,6 +124,12 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         .number("load_s", load)
         .number("total_s", total);
     if (!stats.levels.empty()) json.raw("levels", levels_json(stats));
+    if (stats.instances > 0) {
+        Json own;
+        own.number("count", stats.instances).number("bricks", stats.instance_bricks);
+        own.number("bricks_new", stats.instance_bricks_new).number("ms", stats.instances_ms);
+        json.raw("instances", own.object());
+    }
     add_journal(json, world);
     return json.line();
 }

@@ -103,4 +103,19 @@ struct Transform {
     friend bool operator==(const Transform&, const Transform&) = default;
 };
 
+/// A rigid frame: parent = position + rotation · local.
+struct Pose {
+    vec3 position{};
+    quat rotation{};
+    friend bool operator==(const Pose&, const Pose&) = default;
+};
+constexpr vec3 operator*(const Pose& a, vec3 p) { return a.position + rotate(a.rotation, p); }
+/// First b, then a.
+constexpr Pose operator*(const Pose& a, const Pose& b) { return {a * b.position, a.rotation * b.rotation}; }
+constexpr Pose inverse(const Pose& a) {
+    const quat r = conjugate(a.rotation);
+    return {-rotate(r, a.position), r};
+}
+constexpr vec3 direction_into(const Pose& a, vec3 d) { return rotate(conjugate(a.rotation), d); }
+
 }  // namespace kiln

@@ -18,6 +18,7 @@
 namespace kiln {
 
 namespace field {
+class BrickSet;
 class Clipmap;
 class Field;
 }  // namespace field
@@ -69,6 +70,13 @@ struct Environment {
 
 enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };
 
+/// Something that moves as a whole: bricks of its own, in a frame of its own, which a pose puts into the world. Moving one bakes nothing.
+struct Instance {
+    std::shared_ptr<const field::BrickSet> bricks;  ///< shared by all that look alike
+    Pose pose, before;                              ///< now, and in the frame before
+    uint32_t material = 0;                          ///< number of what its parts without a material are made of
+};
+
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
     std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
@@ -78,7 +86,8 @@ struct Frame {
     std::optional<Environment> environment;  ///< none: a clear sky, with the disc of the first directional light
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
-    int coarsened = 0;  ///< times the voxel size was doubled to fit the pool
+    int coarsened = 0;                ///< times the voxel size was doubled to fit the pool
+    std::vector<Instance> instances;  ///< solid beside the field, as a hard union with it
 };
 
 struct RenderSettings {
@@ -125,6 +134,10 @@ struct RenderStats {
         bool skipped = false;                          ///< its shell was more than the budget
     };
     std::vector<Level> levels;
+    int instances = 0;                 ///< drawn beside the field
+    uint32_t instance_bricks = 0;      ///< resident, of their sets
+    uint32_t instance_bricks_new = 0;  ///< … of them brought to the device by this frame
+    double instances_ms = 0;           ///< CPU time: their tree and records
 };
 
 struct DeviceInfo {

@@ -161,6 +161,12 @@ public:
     Result<EditId> insert(Edit edit, EditId before);
     /// Moves an edit to stand just before another; before none: to the end.
     Result<void> reorder(EditId id, EditId before);
+    /// Puts a body (by any of its edits; the pose is that of its first) or a `dynamic` edit elsewhere, in pictures and in answers. The
+    /// scene stays as it is: nothing is saved, undone or, while it is drawn as an instance, baked. Changing the edit or its body's puts
+    /// it back where the scene has it. Its pose in the frame before is the one that the last frame() saw.
+    Result<void> move(EditId id, const Pose& pose);
+    /// Where that is now; nothing for other edits.
+    std::optional<Pose> pose(EditId id) const;
     /// A change as data, {"add": EDIT} and the like; `name` is what errors call the text.
     Result<void> apply(const std::string& command, const std::string& name = "command");
     Result<void> apply(const TimedCommand& command);

@@ -16,7 +16,7 @@ using namespace measure;
 namespace {
 
 const std::vector<BenchFamily>& families() {
-    static const std::vector<BenchFamily> all{field_family(), journal_family(), physics_family()};
+    static const std::vector<BenchFamily> all{field_family(), world_family(), physics_family(), journal_family()};
     return all;
 }
 

@@ -60,5 +60,6 @@ struct BenchFamily {
 BenchFamily field_family();
 BenchFamily journal_family();
 BenchFamily physics_family();
+BenchFamily world_family();
 
 }  // namespace kiln::measure

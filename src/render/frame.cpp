@@ -3,6 +3,7 @@
 
 #include "base/format.h"
 #include "render/lib/pack.h"
+#include "render/passes/instances.h"
 
 #include <cmath>
 
@@ -114,7 +115,8 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
 
 TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image& refined) {
     TileResult out;
-    const Surface surface = resolve(g, in, words, refined);
+    Surface surface = resolve(g, in, words, refined);
+    resolve_instances(g, in, words, refined, surface);
     if (wanted == View::Shaded) {
         const Image radiance = light(g, in, surface.seen, surface);
         out.radiance = g.readback(radiance);
@@ -136,15 +138,27 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
 
 }  // namespace
 
+namespace {
+
+Visibility see(Graph& g, const TileInputs& in) {
+    Visibility seen = march(g, in);
+    march_instances(g, in, seen);
+    return seen;
+}
+
+}  // namespace
+
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
-    const Visibility seen = march(g, in);
-    TileResult out = record_shading(g, in, wanted, seen.words, in.refine ? refine(g, in, seen.words) : seen.words);
+    const Visibility seen = see(g, in);
+    Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
+    if (in.refine) refine_instances(g, in, seen.words, refined);
+    TileResult out = record_shading(g, in, wanted, seen.words, refined);
     for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
     return out;
 }
 
 TileSeen record_visibility(Graph& g, const TileInputs& in) {
-    const Visibility seen = march(g, in);
+    const Visibility seen = see(g, in);
     TileSeen out{g.readback(seen.words), {}};
     for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
     return out;
@@ -162,6 +176,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
+    instance_kernels(in, view == View::Shaded, out);
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;

@@ -216,6 +216,7 @@ Result<void> GpuField::make_atlas(uint32_t slots, rhi::Format format, Baker bake
         {.size = uint64_t{bricks_x_} * bricks_y_ * bricks_z_ * field::kBrickTableWords * 4, .label = "brick tables"});
     if (!tables) return tables.error();
     tables_ = *tables;
+    ++atlas_number_;
     format_ = format;
     baker_ = baker;
     return {};
@@ -268,7 +269,7 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     if (baker == Baker::Auto) baker = device_->info().kind == rhi::DeviceKind::Cpu ? Baker::Host : Baker::Storage;
     if (baker == Baker::Storage && !device_->caps().storage_r16f) baker = Baker::Copy;
     const bool same_atlas =
-        distances_ && format == format_ && baker == baker_ && next->slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
+        distances_ && format == format_ && baker == baker_ && uint64_t{next->slot_count()} + reserved_ <= atlas_slots();
     const bool here = field_ && same_atlas && next->revision() == field_->revision();
     if (here) return {};
     const bool grown_from_here = field_ && same_atlas && next->parent_revision() == field_->revision();
@@ -360,8 +361,8 @@ Result<void> GpuField::store_programs(const AppendArray<float>* old_samples, con
 // A new atlas. A growing world gets half as much again, where that fits.
 Result<void> GpuField::fit_atlas(uint32_t slots, rhi::Format format, Baker baker) {
     const uint32_t roomy = distances_ ? slots + slots / 2 : slots;
-    auto made = make_atlas(std::max(roomy, 1u), format, baker);
-    if (!made && roomy != slots) made = make_atlas(std::max(slots, 1u), format, baker);
+    auto made = make_atlas(std::max(roomy + reserved_, 1u), format, baker);
+    if (!made && roomy != slots) made = make_atlas(std::max(slots + reserved_, 1u), format, baker);
     if (!made) drop_atlas();
     return made;
 }
@@ -380,7 +381,7 @@ Result<void> GpuField::update(const field::Clipmap& next) {
         return error;
     };
     const bool same_atlas = distances_ && format == format_ && baker_ == Baker::Host &&
-                            next.slot_count() <= bricks_x_ * bricks_y_ * bricks_z_;
+                            uint64_t{next.slot_count()} + reserved_ <= atlas_slots();
     const field::Clipmap* const old = before && same_atlas && before->level_count() == next.level_count() &&
                                               before->options().cells == next.options().cells &&
                                               before->options().format == next.options().format
@@ -531,6 +532,13 @@ Result<void> GpuField::store_texels(std::span<const uint32_t> slots, int workers
         if (auto submit = runner_->execute(graph); !submit) return submit.error();
     }
     return {};
+}
+
+Result<void> GpuField::store_reserved(const field::HostBricks& bricks, uint32_t first) {
+    std::vector<uint32_t> slots = bricks.field().slots();
+    for (uint32_t& slot : slots) slot += first;
+    return store_texels(slots, bricks.field().options().workers,
+                        [&](uint32_t slot) { return bricks.content(slot - first); });
 }
 
 FieldHandles GpuField::import(Graph& graph) const {

@@ -5,6 +5,7 @@
 
 #include "field/clipmap.h"
 #include "field/field.h"
+#include "field/host_bricks.h"
 #include "render/graph.h"
 #include "render/passes/tape_use.h"
 #include "rhi/device.h"
@@ -49,6 +50,15 @@ public:
 
     // Makes the GPU's copy that of `levels` as it is now, whose bricks are made already: what changed since the last call is written.
     Result<void> update(const field::Clipmap& levels);
+
+    // Keeps the last `slots` bricks of the atlas for instances; more may make update() lay out another atlas.
+    void reserve(uint32_t slots) { reserved_ = slots; }
+    uint32_t atlas_slots() const { return bricks_x_ * bricks_y_ * bricks_z_; }
+    // Another number: another atlas, in whose reserve nothing is.
+    uint64_t atlas_number() const { return atlas_number_; }
+    rhi::Format format() const { return format_; }
+    // Puts bricks into the reserve, from slot `first` on.
+    Result<void> store_reserved(const field::HostBricks& bricks, uint32_t first);
 
     FieldHandles import(Graph& graph) const;
 
@@ -129,6 +139,8 @@ private:
     rhi::Format format_ = rhi::Format::Undefined;
     Baker baker_ = Baker::Auto;
     uint32_t bricks_x_ = 0, bricks_y_ = 0, bricks_z_ = 0;
+    uint32_t reserved_ = 0;
+    uint64_t atlas_number_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
     bool outside_is_concave_ = false;
     TapeUse use_, outside_use_;

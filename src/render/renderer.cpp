@@ -7,10 +7,12 @@
 #include "field/field.h"
 #include "render/frame.h"
 #include "render/lens.h"
+#include "render/merged.h"
 #include "render/graph_runner.h"
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
+#include "render/passes/instances.h"
 #include "render/picture.h"
 #include "rhi/create.h"
 
@@ -36,6 +38,7 @@ struct Renderer::Impl {
     std::unique_ptr<rhi::Device> device;
     std::unique_ptr<Runner> runner;
     std::unique_ptr<GpuField> field;
+    std::unique_ptr<GpuInstances> instances;
     std::string fault;  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
@@ -45,6 +48,7 @@ struct Renderer::Impl {
     RenderStats stats;
 
     ~Impl() {
+        instances.reset();
         field.reset();
         for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
             if (!runner || !buffer) continue;
@@ -58,6 +62,8 @@ struct Renderer::Impl {
     // Brings a frame's environment image to the device.
     Result<void> bring(const Frame& frame);
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
+    // The exact path has instances in its program.
+    Result<Picture> render_merged(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                              Picture& picture);
     // Software devices run the tape many times slower than our SIMD.
@@ -88,6 +94,8 @@ struct Renderer::Impl {
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
+        in.has_instances = !frame.instances.empty();
+        in.use_of_instances = instances->use();
         return in;
     }
     void add_times(const FrameTimes& times);
@@ -105,6 +113,7 @@ Result<void> Renderer::Impl::prepare() {
     });
     runner = std::make_unique<Runner>(*device);
     field = std::make_unique<GpuField>(*runner);
+    instances = std::make_unique<GpuInstances>(*runner, *field);
     const std::span<const uint32_t> table = shade::ggx_albedo_table();
     auto buffer = device->create_buffer({.size = table.size_bytes(), .label = "ggx albedo"});
     if (!buffer) return buffer.error();
@@ -153,6 +162,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     const auto inputs_on = [&](Graph& g) {
         TileInputs in = inputs(frame, settings);
         in.field = field->import(g);
+        in.instances = instances->import(g);
         in.frame = g.block(params);
         if (in.levels) in.levels_block = g.block(field->levels());
         const FrameRay no_ray{};
@@ -198,6 +208,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         visibility = std::move(*words);
         const auto start = std::chrono::steady_clock::now();
         refined = refine_on_host(field->code_of_bricks(), params, visibility);
+        refine_instances_on_host(*instances, params, visibility, refined);
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         add_times({.passes = {{.name = "refine", .ms = ms}}, .total_ms = ms});
     }
@@ -225,6 +236,19 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     return {};
 }
 
+Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSettings& settings) {
+    auto field_of_all = merged_field(frame);
+    if (!field_of_all) return Error{"analytic: " + field_of_all.error().message, field_of_all.error().kind};
+    Frame merged = frame;
+    merged.field = std::move(*field_of_all);
+    merged.instances.clear();
+    auto picture = render(merged, settings);
+    stats.instances = int(frame.instances.size());
+    // Each is one edit of the merged program, whatever it is made of.
+    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size()) - 1;
+    return picture;
+}
+
 Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings& settings) {
     KILN_ASSERT(frame.field != nullptr || frame.levels != nullptr, "a Frame without a field; World::frame() makes one");
     const bool levels = frame.levels != nullptr;
@@ -237,6 +261,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         return Error{
             "analytic: a world of several levels is drawn from bricks; set field.levels to 1 to march its edits",
             ErrorKind::Usage};
+    if (settings.analytic && !frame.instances.empty()) return render_merged(frame, settings);
     if (settings.analytic) {
         const std::span<const sdf::Instruction> code = program.tape();
         if (std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); }))
@@ -246,16 +271,19 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                 "it has registers); draw it from bricks",
                 ErrorKind::Usage};
     }
+    instances->reserve(frame.instances);
     if (auto updated = levels ? field->update(*frame.levels)
                               : field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto);
         !updated)
         return updated.error();
+    if (auto updated = instances->update(frame.instances); !updated) return updated.error();
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
         return warm.error();
 
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
     params->sky = shade::sky_params(frame);
+    instances->place(frame.instances, *params);
     if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
@@ -293,11 +321,16 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.exposure = eye.multiplier;
     stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
     stats.edits = int(program.index.size());
+    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size());
     for (int level = 0; levels && level < frame.levels->level_count(); ++level) {
         const field::LevelCounts& c = frame.levels->counts(level);
         stats.levels.push_back({double(frame.levels->voxel_size(level)), c.bricks, c.missing_cells, c.refused_cells,
                                 c.baked, c.evicted, c.entered_cells, c.skipped});
     }
+    stats.instances = int(frame.instances.size());
+    stats.instance_bricks = instances->bricks();
+    stats.instance_bricks_new = instances->bricks_new();
+    stats.instances_ms = instances->place_ms();
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;

@@ -7,6 +7,7 @@
 #include "field/field.h"
 #include "render/lens.h"
 #include "render/lib/pack.h"
+#include "render/merged.h"
 #include "render/reference.h"
 
 #include <kiln/renderer.h>
@@ -39,7 +40,9 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     if (settings.view != View::Shaded)
         return Error{"the reference draws the shaded view only; leave --view out", ErrorKind::Usage};
     const auto start = std::chrono::steady_clock::now();
-    const sdf::Program& program = frame.levels ? *frame.levels->program() : frame.field->program();
+    const auto merged = render::merged_program(frame);
+    if (!merged) return Error{"the reference: " + merged.error().message, merged.error().kind};
+    const sdf::Program& program = *merged;
     const scene::ExactField exact(program);
     render::ReferenceField field;
     field.distance = [&](dvec3 p) { return exact.distance(p); };

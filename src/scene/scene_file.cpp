@@ -179,7 +179,8 @@ private:
     bool ids(std::string_view list, std::unordered_map<std::string_view, uint32_t>& out) {
         const auto at = section(list);
         if (!at) return true;
-        if (doc_.first(*at) != doc_.next(*at)) scene_.undrawn.emplace_back(list);
+        // Bodies show their edits; those of meshes are not seen while meshes are not.
+        if (doc_.first(*at) != doc_.next(*at) && list != "bodies") scene_.undrawn.emplace_back(list);
         uint32_t n = 0;
         for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c), ++n) {
             const JsonIndex id = *doc_.find(c, "id");

@@ -76,6 +76,7 @@ Result<void> World::Impl::exchange_edit(Change& change) {
     if (compile_later) return {};
     if (removed != field::kNoRow) list.remove(removed);
     row_changed(removed, inserted);
+    mover_changed(change.id.index, removed, inserted);
     if (list.edits.size() > 4 * size_t(edits.size()) + kMostOldRows) return compile_all();
     return {};
 }

@@ -44,6 +44,7 @@ double cells_of(const Box3& box, float voxel) {
 void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     const std::lock_guard lock(mutex);
     program.reset();
+    all.reset();
     if (levels) level_changes.push_back({removed, inserted});
     if (level_changes.size() > kMostChanges) {
         levels.reset();
@@ -76,7 +77,11 @@ void World::Impl::forget_changes() {
 
 std::shared_ptr<const sdf::Program> World::Impl::compiled() {
     const std::lock_guard lock(mutex);
-    if (!program) program = std::make_shared<const sdf::Program>(list);
+    if (!program) {
+        sdf::Program out = list;
+        for (const uint32_t row : apart_rows()) out.remove(row);
+        program = std::make_shared<const sdf::Program>(std::move(out));
+    }
     return program;
 }
 
@@ -140,12 +145,16 @@ Result<void> World::Impl::compile_all() {
     if (!made) return placed(made.error());
     list = std::move(*made);
     for (uint32_t i = 0; i < slots.size(); ++i) edits.set_row(slots[i], i);
-    const std::lock_guard lock(mutex);
-    program.reset();
-    built = {};
-    forget_changes();
-    levels.reset();
-    level_changes.clear();
+    {
+        const std::lock_guard lock(mutex);
+        program.reset();
+        all.reset();
+        built = {};
+        forget_changes();
+        levels.reset();
+        level_changes.clear();
+    }
+    find_movers();
     return {};
 }
 
@@ -171,18 +180,26 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     const std::shared_ptr<const sdf::Program> now = compiled();
     const std::lock_guard lock(mutex);
     const bool comparable = built.field && settings == built_with;
-    if (comparable && changes.empty()) return built;
+    std::vector<uint32_t> apart = apart_rows();
+    if (comparable && changes.empty() && apart == built_apart) return built;
     if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
         return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
     if (settings.bounds && (settings.bounds->empty() || !settings.bounds->finite()))
         return Error{"field_settings.bounds must be finite, with min below max", ErrorKind::Usage};
-    const Resolution r = resolution(*now, settings);
+    const Resolution r = resolution(list, settings);
     Built next;
     if (comparable && built.coarsened == 0 && built.field->options().voxel_size == r.voxel_size &&
         built.field->options().bounds == r.bounds && changes.size() <= kMostChanges) {
+        const std::vector<field::RowChange> changed = changes_beside(changes, built_apart, apart);
+        if (changed.empty()) {
+            built_apart = std::move(apart);
+            forget_changes();
+            return built;
+        }
         // Only what the changes reach is made again.
-        if (auto updated = field::Field::update(*built.field, now, changes)) {
+        if (auto updated = field::Field::update(*built.field, now, changed)) {
             built.field = std::move(*updated);
+            built_apart = std::move(apart);
             forget_changes();
             return built;
         }
@@ -202,6 +219,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     }
     built = next;
     built_with = settings;
+    built_apart = std::move(apart);
     forget_changes();
     return next;
 }
@@ -222,13 +240,13 @@ Result<void> World::Impl::read_sky(const std::string& file) {
 }
 
 std::shared_ptr<const WorldView::Impl> World::Impl::view() {
-    const std::shared_ptr<const sdf::Program> ready = compiled();
+    const std::shared_ptr<const sdf::Program> ready = whole();
     const std::lock_guard lock(mutex);
     if (!asked || asked->program != ready) asked = std::make_shared<const WorldView::Impl>(ready, generations);
     return asked;
 }
 
-Box3 World::bounds() const { return impl_->compiled()->bounds; }
+Box3 World::bounds() const { return impl_->whole()->bounds; }
 
 Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 focus, const FieldSettings& settings,
                                                                          const FrameBudget& budget) {
@@ -236,14 +254,15 @@ Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 fo
     const std::lock_guard lock(mutex);
     const dvec3 at{double(focus.x), double(focus.y), double(focus.z)};
     if (levels && settings == levels_with) {
-        if (!level_changes.empty()) levels->edit(now, level_changes);
+        const auto changed = changes_beside(level_changes, levels_apart, apart_rows());
+        if (!changed.empty()) levels->edit(now, changed);
         levels->move(at);
     } else {
         if (!std::isfinite(settings.voxel_size) || settings.voxel_size < 0)
             return Error{"field_settings.voxel_size must be a finite number, 0 for automatic", ErrorKind::Usage};
         auto made = field::Clipmap::make(
             now,
-            {.voxel_size = resolution(*now, settings).voxel_size,
+            {.voxel_size = resolution(list, settings).voxel_size,
              .levels = settings.levels,
              .cells = settings.cells,
              .format = settings.distance_8bit ? field::DistanceFormat::Snorm8 : field::DistanceFormat::Half},
@@ -253,14 +272,14 @@ Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 fo
         levels_with = settings;
     }
     level_changes.clear();
+    levels_apart = apart_rows();
     levels->work({.bricks = budget.bricks,
                   .seconds = budget.seconds < 1e9 ? budget.seconds : std::numeric_limits<double>::infinity()});
     return std::make_shared<const field::Clipmap>(*levels);
 }
 
 Result<Camera> World::camera(std::string_view name) const {
-    if (name.empty())
-        return cameras.empty() ? scene::framing_camera(impl_->compiled()->bounds) : cameras.front().second;
+    if (name.empty()) return cameras.empty() ? scene::framing_camera(impl_->whole()->bounds) : cameras.front().second;
     std::vector<std::string_view> names;
     for (const auto& [known, value] : cameras) {
         if (known == name) return value;
@@ -282,11 +301,17 @@ Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) cons
         auto levels = impl_->levels_around(camera.position, field_settings, budget);
         if (!levels) return levels.error();
         out.levels = std::move(*levels);
+        const field::ClipmapOptions& options = out.levels->options();
+        if (auto done = impl_->instances_of(options.voxel_size, options.format, out.instances); !done)
+            return done.error();
     } else {
         auto built = impl_->field(field_settings);
         if (!built) return built.error();
         out.field = built->field;
         out.coarsened = built->coarsened;
+        const field::FieldOptions& options = out.field->options();
+        if (auto done = impl_->instances_of(options.voxel_size, options.format, out.instances); !done)
+            return done.error();
     }
     out.materials.reserve(impl_->data.materials.size() + 1);
     out.materials.emplace_back();  // sdf::kDefaultMaterial
@@ -340,7 +365,9 @@ std::string World::inspect_json() const {
     out["lights"] = lights.size();
     out["cameras"] = camera_names;
     out["not_drawn_yet"] = data.undrawn;
-    const std::shared_ptr<const sdf::Program> program = impl_->compiled();
+    const std::shared_ptr<const sdf::Program> program = impl_->whole();
+    out["instances"] =
+        std::count_if(impl_->movers.begin(), impl_->movers.end(), [](const auto& m) { return m.second.apart; });
     if (impl_->report) {
         const JournalReport& r = *impl_->report;
         out["journal"] = {{"file", r.file}, {"commands", r.commands}, {"dropped_bytes", r.dropped_bytes}};
@@ -366,7 +393,7 @@ std::string World::inspect_json() const {
     }
     if (!meshes.empty()) out["meshes"] = meshes;
     if (field_settings.levels > 1) {
-        const float voxel = impl_->resolution(*program, field_settings).voxel_size;
+        const float voxel = impl_->resolution(impl_->list, field_settings).voxel_size;
         out["voxel_size"] = voxel;
         out["levels"] = field_settings.levels;
         out["cells"] = field_settings.cells;

@@ -8,9 +8,11 @@
 #include "scene/heights.h"
 #include "scene/history.h"
 #include "scene/journal.h"
+#include "scene/movers.h"
 #include "scene/scene_file.h"
 #include "scene/sky_image.h"
 
+#include "base/hash.h"
 #include "base/paged_array.h"
 #include "field/clipmap.h"
 #include "field/field.h"
@@ -19,6 +21,7 @@
 
 #include <kiln/world.h>
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -112,19 +115,47 @@ struct World::Impl {
     // Made when asked; under the mutex, because const functions may be called from any thread.
     std::mutex mutex;
     sdf::Program list;                             ///< what the edits compile to; kept up with every change
-    std::shared_ptr<const sdf::Program> program;   ///< a snapshot of it
-    std::shared_ptr<const WorldView::Impl> asked;  ///< answers about `program`
+    std::shared_ptr<const sdf::Program> program;   ///< a snapshot of it, without what stands apart
+    std::shared_ptr<const sdf::Program> all;       ///< with that, where it is
+    std::shared_ptr<const WorldView::Impl> asked;  ///< answers about all
     PagedArray<uint32_t, 256> generations;         ///< of slots, shared with views
     Built built;
     FieldSettings built_with;
+    std::vector<uint32_t> built_apart;                      ///< rows that were not in its program
     std::vector<field::RowChange> changes;                  ///< since `built`
     std::unordered_map<uint32_t, uint32_t> inserted_since;  ///< rows that `changes` insert, to where
     void forget_changes();
     std::shared_ptr<const field::HostBricks> bricks;  ///< of some revision of the field
     std::optional<field::Clipmap> levels;             ///< of a world of several, where it was last looked at from
     FieldSettings levels_with;
+    std::vector<uint32_t> levels_apart;
     std::vector<field::RowChange> level_changes;  ///< since `levels`
     scene::Grids grids;
+
+    // What moves as a whole (world_movers.cpp). The owner's thread, but for the last three.
+    std::map<uint32_t, scene::Mover> movers;          ///< by the slot of their first edit
+    std::unordered_map<uint32_t, uint32_t> mover_of;  ///< by the slots of all their edits
+    std::map<Hash128, std::weak_ptr<const field::BrickSet>> brick_sets;
+    Result<void> compile_mover(scene::Mover& mover);
+    bool stands_apart(const scene::Mover& mover) const;
+    Result<void> settle_mover(scene::Mover& mover);
+    void add_mover(scene::Mover mover);
+    void drop_mover(uint32_t key);
+    std::optional<scene::Mover> mover_at(uint32_t slot) const;
+    /// After an edit's row was exchanged.
+    void mover_changed(uint32_t slot, uint32_t removed, uint32_t inserted);
+    /// After the whole list was compiled.
+    void find_movers();
+    std::vector<uint32_t> apart_rows() const;
+    /// What changed in a program without the rows that stand apart, from what changed in the list.
+    static std::vector<field::RowChange> changes_beside(std::span<const field::RowChange> of_list,
+                                                        std::span<const uint32_t> apart_before,
+                                                        std::span<const uint32_t> apart_now);
+    /// The list with what stands apart where it is, as hard unions.
+    std::shared_ptr<const sdf::Program> whole();
+    /// What stands apart, beside a field of that voxel size; `shows`: a frame, for the next of which these poses are the ones before.
+    Result<void> instances_of(float field_voxel, field::DistanceFormat format, std::vector<Instance>& out,
+                              bool shows = true);
 
     /// The image of the environment: read when its name is first met, brought into shape when it is first drawn.
     struct SkyImage {

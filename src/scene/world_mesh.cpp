@@ -3,6 +3,8 @@
 
 #include "scene/world_impl.h"
 
+#include "sdf/place.h"
+
 #include "field/mesh_facts.h"
 #include "field/mesh_simplify.h"
 #include "field/meshing.h"
@@ -81,8 +83,8 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
             ErrorKind::Usage};
     if (!(settings.simplify_share > 0 && settings.simplify_share <= 1) || !(settings.simplify_error >= 0))
         return Error{"simplifying a mesh: keep a share in (0, 1], and an error of 0 or more metres", ErrorKind::Usage};
-    std::shared_ptr<const sdf::Program> program = impl_->compiled();
-    const Impl::Resolution r = impl_->resolution(*program, field_settings);
+    std::shared_ptr<const sdf::Program> program = impl_->whole();
+    const Impl::Resolution r = impl_->resolution(impl_->list, field_settings);
     const Box3 bounds = settings.bounds.value_or(r.bounds);
     if (!positive(bounds)) return Error{"a mesh's bounds must be finite, with min below max", ErrorKind::Usage};
     const float cell = settings.cell > 0 ? settings.cell : r.voxel_size;
@@ -94,15 +96,10 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
     const Box3 solid = program->bounds.inflated(reach);
     const bool within = !program->unbounded && bounds.contains(solid.min) && bounds.contains(solid.max);
     if (!within && !rows.empty()) {
-        std::vector<Edit> edits;
-        impl_->edits.each([&](uint32_t slot) { edits.push_back(*impl_->edits[slot].edit); });
-        edits.push_back(cut_to(bounds));
-        const std::lock_guard lock(impl_->mutex);
-        const auto source = scene::with_grids(edits, impl_->data.objects, impl_->data.folder, impl_->grids);
-        if (!source) return source.error();
-        auto made = sdf::compile(source->source());
-        if (!made) return made.error();
-        program = std::make_shared<const sdf::Program>(std::move(*made));
+        sdf::Program cut = sdf::detached(*program);
+        const uint64_t order = sdf::order_between(program->edits[rows.back()].order, UINT64_MAX);
+        if (auto row = sdf::insert(cut, cut_to(bounds), {}, {}, order, UINT32_MAX); !row) return row.error();
+        program = std::make_shared<const sdf::Program>(std::move(cut));
     }
 
     field::FieldOptions options;

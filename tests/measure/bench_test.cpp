@@ -79,6 +79,25 @@ TEST(Bench, WhatTheJournalRowsDidReadsBackAsItWas) {
     }
 }
 
+TEST(Bench, FlyingDiggingAndMovingLeaveWhatABuildFromNothingHolds) {
+    // Flights take seconds: these two rows are the quick ones. Counts are checked as they fly.
+    const std::vector<std::string> rows{"world/dig", "world/move.1000"};
+    const auto report = run_bench(rows, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_EQ(report->rows.size(), 5u);
+    for (const BenchRow& row : report->rows) {
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_EQ(row.checksum.size(), 16u) << row.name;
+    }
+}
+
+TEST(BenchSlow, FlightsMakeNoCellThatDidNotEnterAndEndAsTheyShould) {
+    const std::vector<std::string> rows{"world/fly", "world/fast", "world/teleport"};
+    const auto report = run_bench(rows, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->rows.size(), 12u);
+}
+
 TEST(Bench, AChecksumFollowsTheSceneAndNothingElse) {
     const std::vector<std::string> bake{"field/bake"};
     const auto checksum = [&](const BenchOptions& o) { return run_bench(bake, o)->rows.at(0).checksum; };

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Gate G21: what C++ and the shaders share has the same offsets on both sides, as read back from the SPIR-V.
+#include "render/passes/instances.h"
 #include "render/passes/passes.h"
 #include "rhi/spirv_reflect.h"
 
@@ -60,7 +61,8 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
     EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, view) + 4);
     for (const Kernel* kernel : {&kMarch, &kMarchLevels, &kMarchExact, &kRefine, &kResolve, &kResolveExact,
-                                 &kResolveLevels, &kShadow, &kShadowExact, &kShadowLevels, &kLight, &kView}) {
+                                 &kResolveLevels, &kShadow, &kShadowExact, &kShadowLevels, &kLight, &kView,
+                                 &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, 0);
         ASSERT_TRUE(b) << kernel->name;
@@ -102,6 +104,20 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     const std::vector<uint32_t> light{
         AT(LightRecord, position),   AT(LightRecord, direction),   AT(LightRecord, color), AT(LightRecord, kind),
         AT(LightRecord, spot_scale), AT(LightRecord, spot_offset), AT(LightRecord, pad_0)};
+    std::vector<uint32_t> set;
+    for (uint32_t i = 0; i < 16; ++i) set.push_back(i * 4);
+    EXPECT_EQ(AT(InstanceSet, samples_first), 52u);
+    expect_array(kMarchInstances, 2, set, sizeof(InstanceSet));
+    std::vector<uint32_t> instance;
+    for (uint32_t i = 0; i < 6; ++i) instance.push_back(i * 16);
+    for (uint32_t i = 0; i < 8; ++i) instance.push_back(AT(InstanceRecord, eye_x) + i * 4);
+    EXPECT_EQ(AT(InstanceRecord, before_x), 48u);
+    EXPECT_EQ(AT(InstanceRecord, material), 116u);
+    expect_array(kMarchInstances, 1, instance, sizeof(InstanceRecord));
+    std::vector<uint32_t> node;
+    for (uint32_t i = 0; i < 8; ++i) node.push_back(i * 4);
+    EXPECT_EQ(AT(InstanceNode, skip), 12u);
+    expect_array(kMarchInstances, 3, node, sizeof(InstanceNode));
     expect_array(kShadow, 3, light, sizeof(LightRecord));
     expect_array(kLight, 2, light, sizeof(LightRecord));
 }
@@ -115,15 +131,17 @@ TEST(Layout, PushDataIsTheSame) {
                                          AT(BakePush, params_first), AT(BakePush, atlas_bricks_x_y)}))
             << kernel->name;
     }
+    for (const Kernel* kernel : {&kMarchInstances, &kShadowInstances})
+        EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(InstancePush)) << kernel->name;
     for (const Kernel* kernel : {&kShadow, &kShadowExact, &kLight}) {
         EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(ShadowPush)) << kernel->name;
     }
 }
 
 TEST(Layout, EveryKernelFitsTheFloor) {
-    for (const Kernel* kernel :
-         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact, &kRefine, &kResolve,
-          &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap, &kView}) {
+    for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact,
+                                 &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap,
+                                 &kView, &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

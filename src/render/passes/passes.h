@@ -3,6 +3,7 @@
 #pragma once
 
 #include "render/gpu_field.h"
+#include "render/gpu_instances.h"
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
@@ -59,6 +60,9 @@ struct TileInputs {
     float elapsed = 0;  // seconds since the picture before
     TapeUse use;        // of the code that is marched and resolved
     TapeUse use_of_bricks;
+    InstanceHandles instances;  // none where the frame has none
+    bool has_instances = false;
+    TapeUse use_of_instances;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

@@ -36,28 +36,12 @@ layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams 
 #include "render/passes/field.glsl"
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
+#include "render/passes/materials.glsl"
 #ifdef KILN_EXACT
 #define KILN_TAPE_MATERIALS
 #include "render/passes/tape_buffers.glsl"
 #include "render/passes/code_of.glsl"
 #endif
-
-MaterialRecord material_of(uint number) {
-    return material_table[number < frame.material_count ? number : 0u];
-}
-
-void add_material(inout SurfaceSample s, uint number, float weight) {
-    MaterialRecord m = material_of(number);
-    s.albedo += weight * vec3(m.base_red, m.base_green, m.base_blue);
-    s.emissive += weight * vec3(m.emissive_red, m.emissive_green, m.emissive_blue);
-    s.roughness += weight * m.roughness;
-    s.metallic += weight * m.metallic;
-}
-
-vec3 unit_or(vec3 v, vec3 other) {
-    float size = length(v);
-    return size > 1e-20 ? v / size : other;
-}
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -66,6 +50,7 @@ void main() {
     uint state = seen.y >> 28u;
     int slot = int(seen.y & 0x0fffffffu);
     float t = uintBitsToFloat(seen.x);
+    if (state == kSeenInstance) return;  // resolve_instances.comp's
     if (state == kSeenNothing) {
         imageStore(visibility_now, pixel, seen);
         imageStore(surface_words, pixel, uvec4(0u));

@@ -4,7 +4,7 @@
 //   albedo  linear base colour; shown as sRGB      normal  0.5 + 0.5 n, world space; shown as it is; misses black
 //   depth   metres along the ray; shown as t / (t + 1), near is dark, misses white
 //   steps   cells and samples along the ray, 0 … 1 for 0 … 256, as a heat map
-//   bricks  a colour a brick, shaded by the normal
+//   bricks  a colour a brick or instance, shaded by the normal
 //   levels  a colour a level of the clipmap, finest first: red, orange, yellow, green, blue, violet, and again; what no brick shows is grey
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -72,7 +72,7 @@ void main() {
         color = heat(value.x);
     } else if (hit) {
         uint state = seen.y >> 28u;
-        vec3 brick = state == kSeenBrick || state == kSeenPruned ? number_color(seen.y & 0x0fffffffu) : vec3(0.5);
+        vec3 brick = state == kSeenBrick || state == kSeenPruned || state == kSeenInstance ? number_color(seen.y & 0x0fffffffu) : vec3(0.5);
         if (frame.view == kViewLevels && state == kSeenBrick) brick = level_color(seen.z >> kSeenLevelShift);
         value = brick * (0.55 + 0.45 * s.normal.y);
         color = srgb_from_linear3(value);

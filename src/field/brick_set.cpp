@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: MIT
+#include "field/brick_set.h"
+
+#include "base/assert.h"
+#include "sdf/place.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace kiln::field {
+
+namespace {
+
+// Around the solid: a cell owns a brick up to a voxel away, and gradients look one further.
+constexpr float kMarginVoxels = 2;
+
+}  // namespace
+
+float BrickSet::voxel_size_for(const sdf::Program& object, float field_voxel) {
+    const vec3 size = object.bounds.empty() ? vec3{} : object.bounds.max - object.bounds.min;
+    const float least = std::min({size.x, size.y, size.z}), most = std::max({size.x, size.y, size.z});
+    const float wanted = least > 0 ? std::min(field_voxel, least / kLeastVoxels) : field_voxel;
+    return std::max(wanted, most / kMostVoxels);
+}
+
+Hash128 BrickSet::key(const sdf::Program& object, float voxel_size, DistanceFormat format) {
+    std::vector<std::byte> bytes;
+    const auto add = [&](const auto* from, size_t count) {
+        const auto part = std::as_bytes(std::span(from, count));
+        bytes.insert(bytes.end(), part.begin(), part.end());
+    };
+    add(object.tape().data(), object.tape().size());
+    add(object.params.data(), object.params.size());
+    add(object.samples.data(), object.samples.size());
+    add(&voxel_size, 1);
+    add(&format, 1);
+    return hash128(bytes);
+}
+
+Result<std::shared_ptr<const BrickSet>> BrickSet::make(std::shared_ptr<const sdf::Program> object, float voxel_size,
+                                                       DistanceFormat format) {
+    KILN_ASSERT(!object->unbounded, "a brick set of something without bounds");
+    const Box3 solid = sdf::solid_box(*object);
+    for (;; voxel_size *= 2) {
+        const Box3 box = solid.empty() ? Box3{{0, 0, 0}, {0, 0, 0}} : solid;
+        const FieldOptions options{.voxel_size = voxel_size,
+                                   .bounds = box.inflated(kMarginVoxels * voxel_size),
+                                   .format = format,
+                                   .max_bricks = kMostBricks};
+        auto made = HostBricks::build(object, options);
+        if (!made) {
+            if (made.error().kind == ErrorKind::OutOfMemory && voxel_size < 1e6f) continue;
+            return made.error();
+        }
+        BrickSet out;
+        out.bricks_ = std::move(*made);
+        return std::make_shared<const BrickSet>(std::move(out));
+    }
+}
+
+}  // namespace kiln::field

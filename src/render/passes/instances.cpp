@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/instances.h"
+
+#include "shaders/march_instances.spv.h"
+#include "shaders/refine_instances.spv.h"
+#include "shaders/resolve_instances.spv.h"
+#include "shaders/shadow_instances.spv.h"
+
+namespace kiln::render {
+
+const Kernel kMarchInstances{"march instances", kMarchInstancesSpv};
+const Kernel kRefineInstances{"refine instances", kRefineInstancesSpv};
+const Kernel kResolveInstances{"resolve instances", kResolveInstancesSpv};
+const Kernel kShadowInstances{"shadow instances", kShadowInstancesSpv};
+
+namespace {
+
+InstancePush push_of(const InstanceHandles& instances, uint32_t first_light = 0) {
+    return {.node_count = instances.node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0};
+}
+
+}  // namespace
+
+void march_instances(Graph& g, const TileInputs& in, Visibility& seen) {
+    const InstanceHandles& i = in.instances;
+    if (!i) return;
+    const uint32_t groups =
+        ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
+    Image words = g.create("visibility with instances", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    Buffer counted = g.create_buffer("march instances evaluations", uint64_t{groups} * 4);
+    g.dispatch(
+        kMarchInstances, in.size,
+        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
+         g.read(in.field.tables), g.read(in.field.distances), g.read(seen.words), g.write(words), g.write(counted)},
+        push_of(i));
+    seen.evaluations.push_back(counted);
+    seen.words = words;
+}
+
+void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, Image& refined) {
+    const InstanceHandles& i = in.instances;
+    if (!i) return;
+    g.dispatch(specialised(kRefineInstances, i.use), in.size,
+               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.records), g.read(i.code),
+                g.read(i.numbers), g.read(in.rays), g.read(visibility), g.write(refined)});
+}
+
+void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined,
+                       Surface& surface) {
+    const InstanceHandles& i = in.instances;
+    if (!i) return;
+    g.dispatch(
+        kResolveInstances, in.size,
+        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records), g.read(in.rays),
+         g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances), g.read(in.field.materials),
+         g.read(visibility), g.read(refined), g.write(surface.words), g.write(surface.depth), g.write(surface.seen)});
+}
+
+void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
+                      uint32_t first_light, Image& fractions) {
+    const InstanceHandles& i = in.instances;
+    if (!i || in.light_count == 0) return;
+    Image both = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
+    g.dispatch(kShadowInstances, in.size,
+               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
+                g.read(in.rays), g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances),
+                g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both)},
+               push_of(i, first_light));
+    fractions = both;
+}
+
+void instance_kernels(const TileInputs& in, bool shaded, std::vector<const Kernel*>& out) {
+    if (!in.has_instances) return;
+    out.push_back(&kMarchInstances);
+    if (in.refine) out.push_back(&specialised(kRefineInstances, in.use_of_instances));
+    out.push_back(&kResolveInstances);
+    if (shaded) out.push_back(&kShadowInstances);
+}
+
+}  // namespace kiln::render

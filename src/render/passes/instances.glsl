@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// Bricks of instances in kernels: their field for field/march.gpu.h and field/surface.gpu.h, and the walk of a ray through the tree. The including
+// kernel declares first what atlas.glsl and rays.glsl ask for, and
+//   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: InstanceNode nodes[];
+//   for KILN_FIELD_SURFACE also utexture3D materials.
+
+#include "field/codes.gpu.h"
+#include "field/cubic.gpu.h"
+#include "render/passes/atlas.glsl"
+
+#include "render/passes/instance_rays.glsl"
+
+uint field_cell(ivec3 c) {
+    return instance_cells[int(here.cells_first) + cell_word_index(c.x, c.y, c.z, (here.grid.size_x + kCellPage - 1) >> 3, (here.grid.size_y + kCellPage - 1) >> 3)];
+}
+// Slots count from the set's first in the map, in field_… from the atlas' first.
+Corners field_corners(int slot, ivec3 voxel) { return brick_corners(slot + int(here.slot_first), voxel); }
+bool field_voxel_solid(int slot, ivec3 voxel) { return brick_voxel_solid(slot + int(here.slot_first), voxel); }
+void field_enter(uint word, ivec3 texel) {}
+#include "field/march.gpu.h"
+
+bool in_set(ivec3 c) { return all(greaterThanEqual(c, ivec3(0))) && all(lessThan(c, ivec3(here.grid.size_x, here.grid.size_y, here.grid.size_z))); }
+ivec3 set_first_cell() { return ivec3(here.grid.cell_x, here.grid.cell_y, here.grid.cell_z); }
+
+#ifdef KILN_FIELD_SURFACE
+int field_slot(ivec3 cell) {
+    ivec3 c = cell - set_first_cell();
+    if (!in_set(c)) return -1;
+    uint word = field_cell(c);
+    return (word & kCellOccupied) != 0u ? int(word & kCellSlotMask) : -1;
+}
+float field_texel(int slot, ivec3 texel) { return brick_texel(slot + int(here.slot_first), texel); }
+uint field_material(int slot, ivec3 texel) { return brick_material(slot + int(here.slot_first), texel); }
+#include "field/surface.gpu.h"
+#endif
+
+#ifdef KILN_INSTANCE_WALK
+// 1 / direction for boxes: large where it is parallel.
+vec3 walk_inverse(vec3 direction) {
+    vec3 far = mix(vec3(-kFarVoxels), vec3(kFarVoxels), greaterThanEqual(direction, vec3(0.0)));
+    return mix(1.0 / direction, far, lessThan(abs(direction), vec3(1e-20)));
+}
+
+// Does the ray meet the box before t_end?
+bool walk_meets(InstanceNode n, vec3 from, vec3 inverse, float t_end) {
+    vec3 a = (vec3(n.low_x, n.low_y, n.low_z) - from) * inverse;
+    vec3 b = (vec3(n.high_x, n.high_y, n.high_z) - from) * inverse;
+    vec3 low = min(a, b);
+    vec3 high = max(a, b);
+    float t_in = max(max(low.x, low.y), max(low.z, 0.0));
+    float t_out = min(min(high.x, high.y), min(high.z, t_end));
+    return t_in <= t_out;
+}
+#endif

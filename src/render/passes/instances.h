@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: MIT
+// Passes of a frame that draw its instances beside the field. Each does nothing where there are none.
+#pragma once
+
+#include "render/passes/passes.h"
+
+namespace kiln::render {
+
+extern const Kernel kMarchInstances, kRefineInstances, kResolveInstances, kShadowInstances;
+
+// Overwrites the words of pixels where an instance is nearest.
+void march_instances(Graph& g, const TileInputs& in, Visibility& seen);
+// Fills refine()'s words in for them.
+void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, Image& refined);
+// And resolve()'s images.
+void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined, Surface& surface);
+// Multiplies what they hide into shadow()'s fractions.
+void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
+                      uint32_t first_light, Image& fractions);
+// For warm-up.
+void instance_kernels(const TileInputs& in, bool shaded, std::vector<const Kernel*>& out);
+
+// refine_instances(), on the host: words of points on instances into `refined`, what refine_on_host() answered.
+void refine_instances_on_host(const GpuInstances& instances, const FrameParams& frame,
+                              std::span<const uint32_t> visibility, std::span<uint32_t> refined);
+
+}  // namespace kiln::render
