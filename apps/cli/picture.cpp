@@ -56,6 +56,7 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     s.unpruned = o.unpruned;
     s.accelerate = !o.no_accelerate;
     s.refine = !o.no_refine;
+    s.cull_lights = !o.all_lights;
     s.atlas_by_copy = o.atlas_by_copy;
     return s;
 }

@@ -88,6 +88,7 @@ struct RenderSettings {
     bool unpruned = false;   ///< with analytic: every edit at every step, no culling
     bool accelerate = true;  ///< false: visit every cell and voxel (the slow twin of the jumps)
     bool refine = true;  ///< what bricks show is moved to where the exact program has it, with its normal and materials
+    bool cull_lights = true;     ///< false: every light at every pixel (the slow twin of the lists by tile)
     bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
 };

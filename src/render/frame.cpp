@@ -74,7 +74,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
               (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
               (settings.refine && !settings.analytic ? kFrameRefine : 0u) |
-              (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
+              (settings.cull_lights ? 0u : kFrameAllLights) | (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
@@ -166,6 +166,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.push_back(&kView);
         return out;
     }
+    out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
     out.push_back(&light_kernel(in));
     if (!in.develops) return out;

@@ -8,6 +8,8 @@
 #include "render/frame.h"
 #include "render/lens.h"
 #include "render/graph_runner.h"
+#include "render/light_rects.h"
+#include "render/passes/cluster.gpu.h"
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
@@ -65,13 +67,16 @@ struct Renderer::Impl {
     struct TileSize {
         int width, height;
     };
-    TileSize tile_size(const RenderSettings& settings) const {
-        const int most = refines_on_host() ? kTilePixels : kTilePixelsOfGpu;
+    // Tiles are smaller where many lights' bits would not fit a binding.
+    TileSize tile_size(const RenderSettings& settings, size_t lights) const {
+        const size_t bytes = (lights / 32 + 1) * 4;
+        const int masks = int(rhi::kMaxStorageBinding / bytes / 2) * kClusterSide * kClusterSide;
+        const int most = std::min(refines_on_host() ? kTilePixels : kTilePixelsOfGpu, masks);
         const int width = std::min(settings.width, kTileWidth);
-        return {width, std::min(settings.height, most / width)};
+        return {width, std::clamp(most / width, 1, settings.height)};
     }
-    int tiles_of(const RenderSettings& settings) const {
-        const auto [width, height] = tile_size(settings);
+    int tiles_of(const RenderSettings& settings, size_t lights) const {
+        const auto [width, height] = tile_size(settings, lights);
         return ((settings.width + width - 1) / width) * ((settings.height + height - 1) / height);
     }
     // The switches of a frame; its resources are still to come.
@@ -85,7 +90,7 @@ struct Renderer::Impl {
         in.refine = settings.refine && !settings.analytic && !refines_on_host();
         in.camera = frame.camera;
         in.elapsed = settings.elapsed;
-        in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings) == 1;
+        in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
         return in;
@@ -162,7 +167,13 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         std::vector<shade::LightRecord> lights;
         for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
         in.light_count = uint32_t(lights.size());
-        if (lights.empty()) lights.emplace_back();
+        LightRects rects = settings.cull_lights ? light_rects(frame.lights, params.camera, params.tile_x, params.tile_y,
+                                                              params.tile_width, params.tile_height)
+                                                : all_light_rects(lights.size(), params.tile_width, params.tile_height);
+        in.lights_of_tile = rects.most;
+        in.local_lights = rects.local;
+        if (lights.empty()) lights.emplace_back(), rects.rects.emplace_back();
+        in.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
         in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
         in.ggx_table = g.import("ggx albedo", ggx_table);
         const uint32_t nothing[4] = {};
@@ -269,7 +280,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     picture.rgba.resize(pixels * 4);
     picture.srgb.resize(pixels * 4);
     picture.depth.resize(pixels);
-    const auto [tile_width, tile_height] = tile_size(settings);
+    const auto [tile_width, tile_height] = tile_size(settings, frame.lights.size());
     if (!frame.camera.auto_exposure) eye = measured_exposure({}, frame.camera, 0, {});
     if (auto written = device->write_buffer(exposure, 0, std::as_bytes(std::span(&eye, 1))); !written)
         return written.error();

@@ -18,7 +18,7 @@ namespace kiln::render {
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
-    kShadowLevelsHorizons, kLight, kLightImage, kTonemap, kView;
+    kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -44,11 +44,14 @@ struct TileInputs {
     Buffer lights;       // LightRecord
     Buffer ggx_table;
     Buffer environment;  // EnvironmentMap::words; a dummy unless image_sky
+    Buffer light_rects;  // LightRect a light
     uint32_t light_count = 0;
-    rhi::Extent size;       // of the tile
-    bool exact = false;     // some code is marched: analytic, or edits leave the grid
-    bool analytic = false;  // … instead of the bricks
-    bool horizons = false;  // exact code is half-spaces outside the grid, no more
+    uint32_t lights_of_tile = 0;  // at most
+    bool local_lights = false;    // some light ends somewhere
+    rhi::Extent size;             // of the tile
+    bool exact = false;           // some code is marched: analytic, or edits leave the grid
+    bool analytic = false;        // … instead of the bricks
+    bool horizons = false;        // exact code is half-spaces outside the grid, no more
     bool image_sky = false;
     bool levels = false;  // the field is a clipmap
     bool refine = false;  // by the device: the host may do it
@@ -84,8 +87,11 @@ std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams&
 
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
-// Visible fractions of the discs of lights push.first_light … + 3, a channel each.
-Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);
+// Which lights may reach which tile; see cluster.comp and light_walk.glsl.
+Buffer cluster(Graph& g, const TileInputs& in, const Image& visibility);
+// Visible fractions of the discs of lights push.first_light … + 15 of each tile's list, a byte each.
+Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Buffer& masks,
+             const ShadowPush& push);
 const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure.
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
