@@ -17,6 +17,7 @@ struct PictureOptions {
     int reference = 0;
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
          atlas_by_copy = false;
+    bool taa = false;
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };

@@ -90,6 +90,10 @@ struct RenderSettings {
     bool refine = true;  ///< what bricks show is moved to where the exact program has it, with its normal and materials
     bool cull_lights = true;     ///< false: every light at every pixel (the slow twin of the lists by tile)
     bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
+    bool taa = false;  ///< anti-alias by the pictures before of this renderer; the whole picture must be one tile
+    bool taa_jitter =
+        true;           ///< … and look through another place of each pixel every time; false: through their middles
+    bool cut = false;   ///< taa: this picture follows on none before
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
 };
 

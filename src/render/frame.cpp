@@ -116,7 +116,8 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
     TileResult out;
     const Surface surface = resolve(g, in, words, refined);
     if (wanted == View::Shaded) {
-        const Image radiance = light(g, in, surface.seen, surface);
+        Image radiance = light(g, in, surface.seen, surface);
+        if (in.taa) radiance = taa(g, in, radiance, surface.depth, motion(g, in, surface.seen));
         out.radiance = g.readback(radiance);
         if (in.develops) {
             Buffer exposure = in.exposure;
@@ -169,6 +170,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
     out.push_back(&light_kernel(in));
+    if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Pyramid)

@@ -25,7 +25,7 @@ Span slopes(double across, double ahead, double r) {
     constexpr double kSide = std::numbers::pi / 2;
     const double low = middle - half, high = middle + half;
     // From behind a disc may be seen past either side.
-    const bool left = low < -kSide, right = high > kSide;
+    const bool left = low<-kSide, right = high> kSide;
     if (left && right) return {-kEverywhere, kEverywhere};
     if (high <= -kSide || low >= kSide) return {1, -1};
     return {left ? -kEverywhere : std::tan(low), right ? kEverywhere : std::tan(high)};
@@ -81,7 +81,8 @@ LightRects light_rects(std::span<const Light> lights, const shade::CameraParams&
     int32_t most = 0;
     for (uint32_t y = 0; y < uint32_t(down); ++y) {
         for (uint32_t x = 0; x < uint32_t(across); ++x) {
-            at(x, y) += (x > 0 ? at(x - 1, y) : 0) + (y > 0 ? at(x, y - 1) : 0) - (x > 0 && y > 0 ? at(x - 1, y - 1) : 0);
+            at(x, y) +=
+                (x > 0 ? at(x - 1, y) : 0) + (y > 0 ? at(x, y - 1) : 0) - (x > 0 && y > 0 ? at(x - 1, y - 1) : 0);
             most = std::max(most, at(x, y));
         }
     }

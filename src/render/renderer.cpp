@@ -14,6 +14,7 @@
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
 #include "render/picture.h"
+#include "render/temporal.h"
 #include "rhi/create.h"
 
 #include <algorithm>
@@ -45,6 +46,13 @@ struct Renderer::Impl {
     shade::ExposureState eye{};                                    // what is in it, and stays from picture to picture
     std::shared_ptr<const shade::EnvironmentMap> environment_map;  // what is in the buffer
     RenderStats stats;
+    // The picture before, with taa.
+    struct Before {
+        Camera camera;
+        int width, height;
+    };
+    std::optional<Before> before;
+    uint64_t taa_frame = 0;
 
     ~Impl() {
         field.reset();
@@ -69,9 +77,9 @@ struct Renderer::Impl {
     };
     // Tiles are smaller where many lights' bits would not fit a binding.
     TileSize tile_size(const RenderSettings& settings, size_t lights) const {
-        const size_t bytes = (lights / 32 + 1) * 4;
-        const int masks = int(rhi::kMaxStorageBinding / bytes / 2) * kClusterSide * kClusterSide;
-        const int most = std::min(refines_on_host() ? kTilePixels : kTilePixelsOfGpu, masks);
+        const size_t masks =
+            rhi::kMaxStorageBinding / ((lights / 32 + 1) * 4) / 2 * size_t(kClusterSide * kClusterSide);
+        const int most = int(std::min(size_t(refines_on_host() ? kTilePixels : kTilePixelsOfGpu), masks));
         const int width = std::min(settings.width, kTileWidth);
         return {width, std::clamp(most / width, 1, settings.height)};
     }
@@ -90,6 +98,9 @@ struct Renderer::Impl {
         in.refine = settings.refine && !settings.analytic && !refines_on_host();
         in.camera = frame.camera;
         in.elapsed = settings.elapsed;
+        in.taa = settings.taa && settings.view == View::Shaded;
+        in.has_history = before && !settings.cut && before->width == settings.width &&
+                         before->height == settings.height && follows(frame.camera, before->camera);
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
@@ -181,6 +192,9 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        if (in.taa)
+            in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
+                                              params.width, params.height));
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -267,6 +281,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
     params->sky = shade::sky_params(frame);
+    const bool taa = settings.taa && settings.view == View::Shaded;
+    if (taa && tiles_of(settings, frame.lights.size()) > 1)
+        return Error{
+            formatted("taa: a picture of {} x {} pixels is drawn in several tiles on this device; ask for fewer "
+                      "pixels, or leave taa out",
+                      settings.width, settings.height),
+            ErrorKind::Usage};
+    if (settings.cut) taa_frame = 0;
+    if (taa && settings.taa_jitter) params->camera = jittered(params->camera, jitter_of(taa_frame));
     if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
@@ -301,6 +324,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         add_times({.passes = {{.name = "develop", .ms = ms}}, .total_ms = ms});
     }
+    ++taa_frame;
+    before = taa ? std::optional(Before{frame.camera, settings.width, settings.height}) : std::nullopt;
     stats.exposure = eye.multiplier;
     stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
     stats.edits = int(program.index.size());

@@ -156,8 +156,10 @@ TEST_F(Masks, ALightIsInTheTilesThatItReachesAndNoOthers) {
             const int expected = i < std::size(cases) ? cases[i].second[tile] : i == 300 && tile == 6 ? 1 : 0;
             // A ball round a tile's box is wider than the box: cones may be in a tile too many, never in one too few.
             const int bit = int(words[tile * count + i / 32] >> (i % 32) & 1);
-            if (i == 7) EXPECT_GE(bit, expected) << tile;
-            else EXPECT_EQ(bit, expected) << "light " << i << " in tile " << tile;
+            if (i == 7)
+                EXPECT_GE(bit, expected) << tile;
+            else
+                EXPECT_EQ(bit, expected) << "light " << i << " in tile " << tile;
         }
     }
 }
@@ -189,8 +191,7 @@ TEST(LightRects, HoldEveryPixelThatTheRangeReaches) {
         int reached = 0;
         for (int ray = 0; ray < 400; ++ray) {
             const int x = int(random() % part_width), y = int(random() % part_height);
-            const vec3 direction =
-                shade::camera_direction_at(eye, float(left + x) + 0.5f, float(top + y) + 0.5f);
+            const vec3 direction = shade::camera_direction_at(eye, float(left + x) + 0.5f, float(top + y) + 0.5f);
             for (size_t i = 0; i < lights.size(); ++i) {
                 const vec3 to = lights[i].position - camera.position;
                 const float along = std::max(dot(to, direction), 0.0f);

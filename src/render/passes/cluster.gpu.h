@@ -11,7 +11,7 @@ namespace kiln::render {
 using uint = uint32_t;
 #endif
 
-KILN_CONST int kClusterSide = 16;   // pixels
+KILN_CONST int kClusterSide = 16;  // pixels
 KILN_CONST uint kNoLight = ~0u;
 
 #ifdef __cplusplus

@@ -19,6 +19,7 @@ extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
     kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMotion, kTaa;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -62,6 +63,9 @@ struct TileInputs {
     float elapsed = 0;  // seconds since the picture before
     TapeUse use;        // of the code that is marched and resolved
     TapeUse use_of_bricks;
+    bool taa = false;
+    bool has_history = false;  // the frame before is the one that `motion` leads to
+    Block motion;              // MotionParams, with taa
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -95,6 +99,11 @@ Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surf
 const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure.
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+
+// Where each pixel's surface was in the frame before; see motion.comp.
+Image motion(Graph& g, const TileInputs& in, const Image& visibility);
+// With what the frames before saw of the same places; see taa.comp.
+Image taa(Graph& g, const TileInputs& in, const Image& radiance, const Image& depth, const Image& motion);
 
 // The exposure that this picture asks for, from its histogram.
 void expose(Graph& g, const Image& radiance, Buffer& exposure, float seconds, float correction);
