@@ -69,6 +69,12 @@ struct Environment {
 
 enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };
 
+/// A line around an edit, by its row in the field's program.
+struct EditOutline {
+    uint32_t row = 0;
+    Outline outline;
+};
+
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
     std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
@@ -78,7 +84,8 @@ struct Frame {
     std::optional<Environment> environment;  ///< none: a clear sky, with the disc of the first directional light
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
-    int coarsened = 0;  ///< times the voxel size was doubled to fit the pool
+    int coarsened = 0;                  ///< times the voxel size was doubled to fit the pool
+    std::vector<EditOutline> outlines;  ///< of shaded pictures
 };
 
 struct RenderSettings {

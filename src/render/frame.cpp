@@ -123,7 +123,9 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
             Buffer exposure = in.exposure;
             if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
-            out.shown = g.readback(tonemap(g, radiance, glow, exposure, in.camera));
+            Image shown = tonemap(g, radiance, glow, exposure, in.camera);
+            if (in.outline_count > 0) shown = outline(g, in, surface.seen, shown);
+            out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
         }
     } else {
@@ -177,6 +179,8 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.insert(out.end(), {&kBloomDown, &kBloomUp});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
+    if (in.outline_count > 0)
+        out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
     return out;
 }
 

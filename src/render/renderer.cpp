@@ -53,6 +53,7 @@ struct Renderer::Impl {
     };
     std::optional<Before> before;
     uint64_t taa_frame = 0;
+    OutlineCode outlined;  // of the frame
 
     ~Impl() {
         field.reset();
@@ -101,6 +102,9 @@ struct Renderer::Impl {
         in.taa = settings.taa && settings.view == View::Shaded;
         in.has_history = before && !settings.cut && before->width == settings.width &&
                          before->height == settings.height && follows(frame.camera, before->camera);
+        in.outline_count = uint32_t(outlined.records.size());
+        in.widest_outline = outlined.widest;
+        in.use_of_outlines = refines_on_host() ? tape_use(outlined.code) : any_kind(tape_use(outlined.code));
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
@@ -192,6 +196,10 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        if (in.outline_count > 0) {
+            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
+            in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
+        }
         if (in.taa)
             in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
                                               params.width, params.height));
@@ -275,6 +283,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                               : field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto);
         !updated)
         return updated.error();
+    outlined = {};
+    if (settings.view == View::Shaded && !frame.outlines.empty()) {
+        if (tiles_of(settings, frame.lights.size()) == 1)
+            outlined = outline_code(frame.outlines, program);
+        else
+            log::warn("outlines are not drawn: the picture is several tiles");
+        if (outlined.left_out > 0)
+            log::warn("outlines of {} edits are not drawn: the GPU cannot run their code", outlined.left_out);
+    }
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
         return warm.error();
 
@@ -324,7 +341,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         add_times({.passes = {{.name = "develop", .ms = ms}}, .total_ms = ms});
     }
-    ++taa_frame;
+    taa_frame = taa ? taa_frame + 1 : 0;
     before = taa ? std::optional(Before{frame.camera, settings.width, settings.height}) : std::nullopt;
     stats.exposure = eye.multiplier;
     stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);

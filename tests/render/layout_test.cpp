@@ -123,8 +123,10 @@ TEST(Layout, PushDataIsTheSame) {
 
 TEST(Layout, EveryKernelFitsTheFloor) {
     for (const Kernel* kernel :
-         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact, &kRefine, &kResolve,
-          &kResolveExact, &kShadow, &kShadowExact, &kShadowLevelsExact, &kCluster, &kLight, &kTonemap, &kView}) {
+         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch,        &kMarchExact,
+          &kRefine,   &kResolve,    &kResolveExact, &kShadow,         &kShadowExact,  &kShadowLevelsExact,
+          &kCluster,  &kMotion,     &kTaa,          &kOutlineMask,    &kOutlineFlood, &kOutlineDraw,
+          &kLight,    &kTonemap,    &kView}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

@@ -73,7 +73,7 @@ TEST_F(MotionGpu, IsTheReprojectionOfAWorldThatStandsStill) {
         return half & 0x8000 ? -size : size;
     };
     // In double precision, of the same cameras.
-    const auto pixel = [](const shade::CameraParams& c, const double (&to)[3]) {
+    const auto pixel = [](const shade::CameraParams& c, const double(&to)[3]) {
         const auto along = [&](const vec4& v) {
             return to[0] * double(v.x) + to[1] * double(v.y) + to[2] * double(v.z);
         };
@@ -147,8 +147,8 @@ struct TaaGpu : testing::Test {
                     double sum = 0;
                     for (int j = 0; j < kSide; ++j)
                         for (int i = 0; i < kSide; ++i)
-                            sum += double(
-                                large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
+                            sum +=
+                                double(large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
                     out.rgba.push_back(float(sum / (kSide * kSide)));
                 }
             }
@@ -238,7 +238,8 @@ TEST_F(TaaGpu, NothingOfWhatWentAwayStays) {
     // Pixels off by more than a twentieth: of those whose surface is another than before, as their neighbours' are; of all.
     const auto other_surface = [&](const Picture& truth, int x, int y) {
         for (int k = 0; k < 9; ++k) {
-            const size_t i = size_t(std::clamp(y + k / 3 - 1, 0, kHeight - 1) * kWidth + std::clamp(x + k % 3 - 1, 0, kWidth - 1));
+            const size_t i =
+                size_t(std::clamp(y + k / 3 - 1, 0, kHeight - 1) * kWidth + std::clamp(x + k % 3 - 1, 0, kWidth - 1));
             if (!(std::fabs(first.depth[i] - truth.depth[i]) > 0.02f * truth.depth[i])) return false;
         }
         return true;

@@ -6,6 +6,7 @@
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
+#include "render/passes/outline.gpu.h"
 #include "render/passes/shadow.gpu.h"
 #include "render/passes/tape_use.h"
 
@@ -19,7 +20,7 @@ extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
     kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
-extern const Kernel kMotion, kTaa;
+extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -66,6 +67,11 @@ struct TileInputs {
     bool taa = false;
     bool has_history = false;  // the frame before is the one that `motion` leads to
     Block motion;              // MotionParams, with taa
+    Buffer outlines;           // OutlineRecord, where outline_count is above 0
+    Buffer outline_code;
+    uint32_t outline_count = 0;
+    float widest_outline = 0;
+    TapeUse use_of_outlines;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -104,6 +110,23 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
 Image motion(Graph& g, const TileInputs& in, const Image& visibility);
 // With what the frames before saw of the same places; see taa.comp.
 Image taa(Graph& g, const TileInputs& in, const Image& radiance, const Image& depth, const Image& motion);
+
+// Outlined edits, each with its own code.
+struct OutlineCode {
+    std::vector<OutlineRecord> records;
+    std::vector<sdf::Instruction> code;
+    float widest = 0;
+    int left_out = 0;  // no code for a GPU
+};
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program);
+struct OutlineMask {
+    Image owners, seeds;
+};
+OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility);
+// Seeds of the pixels that lines reach.
+Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest);
+// The picture with its lines.
+Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Image& shown);
 
 // The exposure that this picture asks for, from its histogram.
 void expose(Graph& g, const Image& radiance, Buffer& exposure, float seconds, float correction);
