@@ -50,11 +50,11 @@ OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility
     out.owners = g.create("outline owners", {.size = in.size, .format = rhi::Format::R32Uint});
     out.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
     const OutlinePush push{int(in.size.width), int(in.size.height), 0, in.outline_count};
-    g.dispatch(specialised(kOutlineMask, in.use_of_outlines), in.size,
-               {g.uniform(in.frame), g.read(in.rays), g.read(in.field.code), g.read(in.outline_code),
-                g.read(in.field.numbers), g.read(in.outlines), g.read(visibility), g.write(out.owners),
-                g.write(out.seeds)},
-               push);
+    g.dispatch(
+        specialised(kOutlineMask, in.use_of_outlines), in.size,
+        {g.uniform(in.frame), g.read(in.rays), g.read(in.field.code), g.read(in.outline_code), g.read(in.field.numbers),
+         g.read(in.outlines), g.read(visibility), g.write(out.owners), g.write(out.seeds)},
+        push);
     return out;
 }
 

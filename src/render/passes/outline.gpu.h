@@ -17,8 +17,8 @@ struct OutlineRecord {
     float red, green, blue;  // linear
     float width_px;
     uint code_first, code_count;  // the edit alone, as `p_world -> distance in register 0`
-    float blend;                  // metres: how far from its own surface a blend may have moved what is its; see outline_mask.comp
-    uint paints;                  // 1: it changes no distance
+    float blend;  // metres: how far from its own surface a blend may have moved what is its; see outline_mask.comp
+    uint paints;  // 1: it changes no distance
 };
 
 struct OutlinePush {
