@@ -17,6 +17,8 @@ namespace kiln::cli {
 
 namespace {
 
+constexpr int kPicturesOfOneView = 16;  // with --taa, a round of the renderer's jitter
+
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
@@ -52,10 +54,14 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
         return usage("--frames and --budget work with --path; add it");
     if (!o.path.empty() && (!o.camera.empty() || o.reference > 0))
         return usage("--path has its own cameras and no --reference; leave --camera and --reference out");
+    if (o.taa && (o.reference > 0 || s.view != View::Shaded))
+        return usage("--taa works on shaded pictures, without --reference; leave it out");
+    s.taa = o.taa;
     s.analytic = o.analytic;
     s.unpruned = o.unpruned;
     s.accelerate = !o.no_accelerate;
     s.refine = !o.no_refine;
+    s.cull_lights = !o.all_lights;
     s.atlas_by_copy = o.atlas_by_copy;
     return s;
 }
@@ -249,6 +255,7 @@ int render_picture(const PictureOptions& o) {
         if (!renderer) return progress.stage(""), fail(renderer.error());
         progress.stage("drawing");
         picture = renderer->render(*frame, *settings);
+        for (int i = 1; picture && o.taa && i < kPicturesOfOneView; ++i) picture = renderer->render(*frame, *settings);
         stats = renderer->stats();
     }
     if (!picture) return progress.stage(""), fail(picture.error());

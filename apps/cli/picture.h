@@ -15,7 +15,9 @@ struct PictureOptions {
     int frames = 0;
     uint32_t budget = 0;  ///< bricks a frame of a sequence, 0: no limit
     int reference = 0;
-    bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, atlas_by_copy = false;
+    bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
+         atlas_by_copy = false;
+    bool taa = false;
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };

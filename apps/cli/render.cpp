@@ -36,7 +36,10 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_flag("--unpruned", o->unpruned, "with --analytic: every edit at every step");
     verb->add_flag("--no-accelerate", o->no_accelerate, "visit every cell: the slow twin of the jumps");
     verb->add_flag("--no-refine", o->no_refine, "leave hits where the bricks have them, not where the edits do");
+    verb->add_flag("--all-lights", o->all_lights, "every light at every pixel: the slow twin of the lists by tile");
     verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");
+    verb->add_flag("--taa", o->taa,
+                   "anti-alias over time: by the pictures before with --path, else by sixteen of one view");
     verb->add_flag("--json", o->json, "one object with what it took, on stdout");
     verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
     verb->callback([o, &run] { run = [o] { return render_picture(*o); }; });

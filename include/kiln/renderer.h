@@ -77,6 +77,12 @@ struct Instance {
     uint32_t material = 0;                          ///< number of what its parts without a material are made of
 };
 
+/// A line around an edit, by its row in the field's program.
+struct EditOutline {
+    uint32_t row = 0;
+    Outline outline;
+};
+
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
     std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
@@ -86,8 +92,9 @@ struct Frame {
     std::optional<Environment> environment;  ///< none: a clear sky, with the disc of the first directional light
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
-    int coarsened = 0;                ///< times the voxel size was doubled to fit the pool
-    std::vector<Instance> instances;  ///< solid beside the field, as a hard union with it
+    int coarsened = 0;                  ///< times the voxel size was doubled to fit the pool
+    std::vector<Instance> instances;    ///< solid beside the field, as a hard union with it
+    std::vector<EditOutline> outlines;  ///< of shaded pictures
 };
 
 struct RenderSettings {
@@ -97,7 +104,12 @@ struct RenderSettings {
     bool unpruned = false;   ///< with analytic: every edit at every step, no culling
     bool accelerate = true;  ///< false: visit every cell and voxel (the slow twin of the jumps)
     bool refine = true;  ///< what bricks show is moved to where the exact program has it, with its normal and materials
+    bool cull_lights = true;     ///< false: every light at every pixel (the slow twin of the lists by tile)
     bool atlas_by_copy = false;  ///< bake to a buffer and copy, instead of to a storage image
+    bool taa = false;  ///< anti-alias by the pictures before of this renderer; the whole picture must be one tile
+    bool taa_jitter =
+        true;           ///< … and look through another place of each pixel every time; false: through their middles
+    bool cut = false;   ///< taa: this picture follows on none before
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
 };
 

@@ -75,7 +75,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
               (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
               (settings.refine && !settings.analytic ? kFrameRefine : 0u) |
-              (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
+              (settings.cull_lights ? 0u : kFrameAllLights) | (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
@@ -118,13 +118,16 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
     Surface surface = resolve(g, in, words, refined);
     resolve_instances(g, in, words, refined, surface);
     if (wanted == View::Shaded) {
-        const Image radiance = light(g, in, surface.seen, surface);
+        Image radiance = light(g, in, surface.seen, surface);
+        if (in.taa) radiance = taa(g, in, radiance, surface.depth, motion(g, in, surface.seen));
         out.radiance = g.readback(radiance);
         if (in.develops) {
             Buffer exposure = in.exposure;
             if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
-            out.shown = g.readback(tonemap(g, radiance, glow, exposure, in.camera));
+            Image shown = tonemap(g, radiance, glow, exposure, in.camera);
+            if (in.outline_count > 0) shown = outline(g, in, surface.seen, shown);
+            out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
         }
     } else {
@@ -181,14 +184,18 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.push_back(&kView);
         return out;
     }
+    out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
     out.push_back(&light_kernel(in));
+    if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Pyramid)
         out.insert(out.end(), {&kBloomDown, &kBloomUp});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
+    if (in.outline_count > 0)
+        out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
     return out;
 }
 

@@ -9,11 +9,14 @@
 #include "render/lens.h"
 #include "render/merged.h"
 #include "render/graph_runner.h"
+#include "render/light_rects.h"
+#include "render/passes/cluster.gpu.h"
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
 #include "render/passes/instances.h"
 #include "render/picture.h"
+#include "render/temporal.h"
 #include "rhi/create.h"
 
 #include <algorithm>
@@ -46,6 +49,14 @@ struct Renderer::Impl {
     shade::ExposureState eye{};                                    // what is in it, and stays from picture to picture
     std::shared_ptr<const shade::EnvironmentMap> environment_map;  // what is in the buffer
     RenderStats stats;
+    // The picture before, with taa.
+    struct Before {
+        Camera camera;
+        int width, height;
+    };
+    std::optional<Before> before;
+    uint64_t taa_frame = 0;
+    OutlineCode outlined;  // of the frame
 
     ~Impl() {
         instances.reset();
@@ -71,13 +82,16 @@ struct Renderer::Impl {
     struct TileSize {
         int width, height;
     };
-    TileSize tile_size(const RenderSettings& settings) const {
-        const int most = refines_on_host() ? kTilePixels : kTilePixelsOfGpu;
+    // Tiles are smaller where many lights' bits would not fit a binding.
+    TileSize tile_size(const RenderSettings& settings, size_t lights) const {
+        const size_t masks =
+            rhi::kMaxStorageBinding / ((lights / 32 + 1) * 4) / 2 * size_t(kClusterSide * kClusterSide);
+        const int most = int(std::min(size_t(refines_on_host() ? kTilePixels : kTilePixelsOfGpu), masks));
         const int width = std::min(settings.width, kTileWidth);
-        return {width, std::min(settings.height, most / width)};
+        return {width, std::clamp(most / width, 1, settings.height)};
     }
-    int tiles_of(const RenderSettings& settings) const {
-        const auto [width, height] = tile_size(settings);
+    int tiles_of(const RenderSettings& settings, size_t lights) const {
+        const auto [width, height] = tile_size(settings, lights);
         return ((settings.width + width - 1) / width) * ((settings.height + height - 1) / height);
     }
     // The switches of a frame; its resources are still to come.
@@ -91,7 +105,13 @@ struct Renderer::Impl {
         in.refine = settings.refine && !settings.analytic && !refines_on_host();
         in.camera = frame.camera;
         in.elapsed = settings.elapsed;
-        in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings) == 1;
+        in.taa = settings.taa && settings.view == View::Shaded;
+        in.has_history = before && !settings.cut && before->width == settings.width &&
+                         before->height == settings.height && follows(frame.camera, before->camera);
+        in.outline_count = uint32_t(outlined.records.size());
+        in.widest_outline = outlined.widest;
+        in.use_of_outlines = refines_on_host() ? tape_use(outlined.code) : any_kind(tape_use(outlined.code));
+        in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
         in.has_instances = !frame.instances.empty();
@@ -172,7 +192,13 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         std::vector<shade::LightRecord> lights;
         for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
         in.light_count = uint32_t(lights.size());
-        if (lights.empty()) lights.emplace_back();
+        LightRects rects = settings.cull_lights ? light_rects(frame.lights, params.camera, params.tile_x, params.tile_y,
+                                                              params.tile_width, params.tile_height)
+                                                : all_light_rects(lights.size(), params.tile_width, params.tile_height);
+        in.lights_of_tile = rects.most;
+        in.local_lights = rects.local;
+        if (lights.empty()) lights.emplace_back(), rects.rects.emplace_back();
+        in.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
         in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
         in.ggx_table = g.import("ggx albedo", ggx_table);
         const uint32_t nothing[4] = {};
@@ -180,6 +206,13 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        if (in.outline_count > 0) {
+            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
+            in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
+        }
+        if (in.taa)
+            in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
+                                              params.width, params.height));
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -277,6 +310,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         !updated)
         return updated.error();
     if (auto updated = instances->update(frame.instances); !updated) return updated.error();
+    outlined = {};
+    if (settings.view == View::Shaded && !frame.outlines.empty()) {
+        if (tiles_of(settings, frame.lights.size()) == 1)
+            outlined = outline_code(frame.outlines, program);
+        else
+            log::warn("outlines are not drawn: the picture is several tiles");
+        if (outlined.left_out > 0)
+            log::warn("outlines of {} edits are not drawn: the GPU cannot run their code", outlined.left_out);
+    }
     if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
         return warm.error();
 
@@ -284,6 +326,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     if (!params) return params.error();
     params->sky = shade::sky_params(frame);
     instances->place(frame.instances, *params);
+    const bool taa = settings.taa && settings.view == View::Shaded;
+    if (taa && tiles_of(settings, frame.lights.size()) > 1)
+        return Error{
+            formatted("taa: a picture of {} x {} pixels is drawn in several tiles on this device; ask for fewer "
+                      "pixels, or leave taa out",
+                      settings.width, settings.height),
+            ErrorKind::Usage};
+    if (settings.cut) taa_frame = 0;
+    if (taa && settings.taa_jitter) params->camera = jittered(params->camera, jitter_of(taa_frame));
     if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
@@ -297,7 +348,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     picture.rgba.resize(pixels * 4);
     picture.srgb.resize(pixels * 4);
     picture.depth.resize(pixels);
-    const auto [tile_width, tile_height] = tile_size(settings);
+    const auto [tile_width, tile_height] = tile_size(settings, frame.lights.size());
     if (!frame.camera.auto_exposure) eye = measured_exposure({}, frame.camera, 0, {});
     if (auto written = device->write_buffer(exposure, 0, std::as_bytes(std::span(&eye, 1))); !written)
         return written.error();
@@ -318,6 +369,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         add_times({.passes = {{.name = "develop", .ms = ms}}, .total_ms = ms});
     }
+    taa_frame = taa ? taa_frame + 1 : 0;
+    before = taa ? std::optional(Before{frame.camera, settings.width, settings.height}) : std::nullopt;
     stats.exposure = eye.multiplier;
     stats.bricks = levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
     stats.edits = int(program.index.size());

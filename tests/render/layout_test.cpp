@@ -75,7 +75,7 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
 TEST(Layout, LevelsAreTheSame) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
-    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 9u}}) {
+    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, number);
         ASSERT_TRUE(b) << kernel->name;
@@ -120,6 +120,7 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     expect_array(kMarchInstances, 3, node, sizeof(InstanceNode));
     expect_array(kShadow, 3, light, sizeof(LightRecord));
     expect_array(kLight, 2, light, sizeof(LightRecord));
+    expect_array(kCluster, 2, light, sizeof(LightRecord));
 }
 
 TEST(Layout, PushDataIsTheSame) {
@@ -139,9 +140,11 @@ TEST(Layout, PushDataIsTheSame) {
 }
 
 TEST(Layout, EveryKernelFitsTheFloor) {
-    for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch, &kMarchExact,
-                                 &kRefine, &kResolve, &kResolveExact, &kShadow, &kShadowExact, &kLight, &kTonemap,
-                                 &kView, &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
+    for (const Kernel* kernel :
+         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch,        &kMarchExact,
+          &kRefine,   &kResolve,    &kResolveExact, &kShadow,         &kShadowExact,  &kShadowLevelsExact,
+          &kCluster,  &kMotion,     &kTaa,          &kOutlineMask,    &kOutlineFlood, &kOutlineDraw,
+          &kLight, &kTonemap, &kView, &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

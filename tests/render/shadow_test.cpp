@@ -3,6 +3,7 @@
 // distances that bricks store.
 #include "gpu_worlds.h"
 #include "render/lib/pack.h"
+#include "render/light_rects.h"
 
 #include <cmath>
 #include <numbers>
@@ -47,16 +48,19 @@ struct ShadowGpu : GpuTest {
         in.rays = g.upload("rays", std::span<const FrameRay>(rays));
         in.materials = g.upload("materials", std::span<const MaterialRecord>(&material, 1));
         in.lights = g.upload("lights", std::span<const shade::LightRecord>(&lamp, 1));
-        in.light_count = 1;
+        in.light_count = in.lights_of_tile = 1;
+        const LightRects rects = all_light_rects(1, p.tile_width, p.tile_height);
+        in.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
         in.size = {uint32_t(places.size()), 1};
         const Visibility seen = march(g, in);
         const Surface surface = resolve(g, in, seen.words, seen.words);
-        const Readback bytes = g.readback(shadow(g, in, surface.seen, surface, {}));
+        const Readback bytes = g.readback(shadow(g, in, surface.seen, surface, cluster(g, in, surface.seen), {}));
         const Readback depth = g.readback(surface.depth);
         rhi::must(runner_->execute(g));
         for (const float d : rhi::must(depth.get_as<float>())) EXPECT_NEAR(d, 6 * kVoxel, 0.1f * kVoxel);
         std::vector<float> out;
-        for (const uint32_t word : rhi::must(bytes.get_as<uint32_t>())) out.push_back(float(word & 255u) / 255);
+        const std::vector<uint32_t> words = rhi::must(bytes.get_as<uint32_t>());
+        for (size_t i = 0; i < words.size(); i += 4) out.push_back(float(words[i] & 255u) / 255);
         return out;
     }
 };

@@ -29,6 +29,16 @@ KILN_FN vec3 camera_direction_at(CameraParams camera, float x_px, float y_px) {
                           camera.forward.z + x * camera.right.z + y * camera.up.z));
 }
 
+// Where a camera sees what lies at `to` from its eye (any length, in front of it), in pixels as above.
+KILN_FN vec2 camera_pixel(CameraParams camera, vec3 to) {
+    vec3 right = vec3(camera.right.x, camera.right.y, camera.right.z);
+    vec3 up = vec3(camera.up.x, camera.up.y, camera.up.z);
+    float ahead = dot(to, vec3(camera.forward.x, camera.forward.y, camera.forward.z));
+    float x = dot(to, right) / (ahead * dot(right, right));
+    float y = dot(to, up) / (ahead * dot(up, up));
+    return vec2((x + 1.0f) / (2.0f * camera.right.w), (1.0f - y) / (2.0f * camera.up.w));
+}
+
 // Reversed depth with the far plane at infinity: near / (distance along `forward`).
 KILN_FN float reversed_depth(float near_plane, float view_distance) { return near_plane / view_distance; }
 KILN_FN float view_distance(float near_plane, float depth) { return near_plane / depth; }

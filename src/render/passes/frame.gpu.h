@@ -44,6 +44,7 @@ KILN_CONST uint kFrameRays = 2u;             // rays come from the rays buffer i
 KILN_CONST uint kFrameAnalytic = 4u;         // march the pruned programs of the cells
 KILN_CONST uint kFrameUnpruned = 8u;         // march the whole program
 KILN_CONST uint kFrameOutsideConcave = 16u;  // half-spaces alone leave the grid: their field is concave along a ray
+KILN_CONST uint kFrameAllLights = 64u;       // every light at every pixel: the slow twin of the lists
 KILN_CONST uint kFrameRefine = 32u;          // points of bricks are moved to where their code has the surface
 
 // A ray given from outside (tests, queries): origin in voxels, unit direction.

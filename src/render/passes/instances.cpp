@@ -57,14 +57,14 @@ void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, 
 }
 
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
-                      uint32_t first_light, Image& fractions) {
+                      const Buffer& light_masks, uint32_t first_light, Image& fractions) {
     const InstanceHandles& i = in.instances;
     if (!i || in.light_count == 0) return;
-    Image both = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
+    Image both = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kShadowInstances, in.size,
                {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
                 g.read(in.rays), g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances),
-                g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both)},
+                g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both), g.read(light_masks)},
                push_of(i, first_light));
     fractions = both;
 }

@@ -16,7 +16,7 @@ void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, I
 void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined, Surface& surface);
 // Multiplies what they hide into shadow()'s fractions.
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
-                      uint32_t first_light, Image& fractions);
+                      const Buffer& light_masks, uint32_t first_light, Image& fractions);
 // For warm-up.
 void instance_kernels(const TileInputs& in, bool shaded, std::vector<const Kernel*>& out);
 

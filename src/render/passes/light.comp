@@ -1,7 +1,8 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// Light leaving each visible point towards the eye: what it emits and reflects of the sky, and of up to four lights; where nothing
-// is, the sky. Later batches of lights add to the radiance of the ones before.
+// Light leaving each visible point towards the eye: what it emits and reflects of the sky, and of up to sixteen lights of its tile's
+// list; where nothing is, the sky. Later batches go on from the sums of the ones before, which are kept as they are: how a list is
+// cut into batches changes no bit.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -16,9 +17,10 @@ layout(set = 0, binding = 3, std430) readonly buffer GgxTable { uint ggx_table[]
 layout(set = 0, binding = 4, std430) readonly buffer Environment { uint environment_words[]; };
 layout(set = 0, binding = 5) uniform utexture2D visibility;
 layout(set = 0, binding = 6) uniform utexture2D surface_words;
-layout(set = 0, binding = 7) uniform texture2D visible_fractions;
-layout(set = 0, binding = 8) uniform texture2D radiance_before;  // of earlier batches; not read by the first
-layout(set = 0, binding = 9, rgba16f) writeonly uniform image2D radiance;
+layout(set = 0, binding = 7) uniform utexture2D visible_fractions;
+layout(set = 0, binding = 8, std430) readonly buffer LightMasks { uint light_masks[]; };
+layout(set = 0, binding = 9, std430) buffer Sums { float sums[]; };  // of earlier batches, three a pixel; a dummy where there is one batch
+layout(set = 0, binding = 10, rgba16f) writeonly uniform image2D radiance;
 layout(push_constant) uniform Push { ShadowPush push; };
 
 // True: an image is all around, multiplied by the constant sky.
@@ -29,6 +31,7 @@ uint environment_word(uint i) { return environment_words[i]; }
 #include "render/lib/environment.gpu.h"
 #include "render/lib/shading.gpu.h"
 #include "render/passes/rays.glsl"
+#include "render/passes/light_walk.glsl"
 #include "render/passes/surface.glsl"
 
 const float kBrightestStored = 65000.0;  // of a half
@@ -40,12 +43,17 @@ void main() {
     uvec4 seen = texelFetch(visibility, pixel, 0);
     bool first = push.first_light == 0u;
     vec3 sum = vec3(0.0);
-    if (!first) sum = texelFetch(radiance_before, pixel, 0).rgb;
     if ((seen.y >> 28u) == kSeenNothing) {
-        if (first) sum = kImageSky ? environment_radiance(ray.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, ray.direction);
+        if (!first) return;
+        sum = kImageSky ? environment_radiance(ray.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, ray.direction);
         imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 0.0));
         return;
     }
+    LightWalk walk = light_walk(pixel, push.first_light);
+    uint index = next_light(walk);
+    if (!first && index == kNoLight) return;
+    uint kept = 3u * uint(pixel.y * frame.tile_width + pixel.x);
+    if (!first) sum = vec3(sums[kept], sums[kept + 1u], sums[kept + 2u]);
     SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
     SurfaceView view = surface_view(surface_optics(surface.albedo, surface.metallic, surface.roughness), surface.normal, -ray.direction);
     if (first) {
@@ -58,12 +66,17 @@ void main() {
         }
         sum = surface.emissive + surface.ambient * around;
     }
-    vec4 fractions = texelFetch(visible_fractions, pixel, 0);
-    vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * frame.grid.voxel_size;
-    for (uint i = 0u; i < kLightsAtOnce; ++i) {
-        if (push.first_light + i >= frame.light_count) break;
-        float fraction = fractions[i];
-        if (fraction > 0.0) sum += shade_light(view, sample_light(lights[push.first_light + i], p_world), fraction);
+    uvec4 fractions = texelFetch(visible_fractions, pixel, 0);
+    vec3 p_world = seen_point(ray, seen);
+    for (uint channel = 0u; channel < kLightsAtOnce && index != kNoLight; ++channel) {
+        float fraction = visible_fraction(fractions, channel);
+        if (fraction > 0.0) sum += shade_light(view, sample_light(lights[index], p_world), fraction);
+        index = next_light(walk);
+    }
+    if (push.more != 0u) {
+        sums[kept] = sum.r;
+        sums[kept + 1u] = sum.g;
+        sums[kept + 2u] = sum.b;
     }
     imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 1.0));
 }

@@ -16,21 +16,25 @@ const Kernel kLightImage{"light image", kLightSpv, kWithImage};
 const Kernel& light_kernel(const TileInputs& in) { return in.image_sky ? kLightImage : kLight; }
 
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface) {
-    Image radiance;
+    const Buffer masks = cluster(g, in, visibility);
+    const bool batches = in.lights_of_tile > kLightsAtOnce;
+    Buffer sums =
+        g.create_buffer("light sums", batches ? uint64_t{in.size.width} * in.size.height * 3 * sizeof(float) : 16);
+    g.clear(sums);
+    Image radiance = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
     uint32_t first = 0;
     do {
-        const ShadowPush push{.first_light = first, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0};
-        Image fractions = shadow(g, in, visibility, surface, push);
-        shadow_instances(g, in, visibility, surface, first, fractions);
-        Image sum = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
+        const uint32_t next = first + kLightsAtOnce;
+        const ShadowPush push{.first_light = first, .more = next < in.lights_of_tile ? 1u : 0u, .pad_0 = 0, .pad_1 = 0};
+        Image fractions = shadow(g, in, visibility, surface, masks, push);
+        shadow_instances(g, in, visibility, surface, masks, first, fractions);
         g.dispatch(light_kernel(in), in.size,
                    {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table),
-                    g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions),
-                    g.read(radiance ? radiance : fractions), g.write(sum)},
+                    g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions), g.read(masks),
+                    g.read_write(sums), g.write(radiance)},
                    push);
-        radiance = sum;
-        first += kLightsAtOnce;
-    } while (first < in.light_count);
+        first = next;
+    } while (first < in.lights_of_tile);
     return radiance;
 }
 

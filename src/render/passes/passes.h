@@ -7,6 +7,7 @@
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
+#include "render/passes/outline.gpu.h"
 #include "render/passes/shadow.gpu.h"
 #include "render/passes/tape_use.h"
 
@@ -19,7 +20,8 @@ namespace kiln::render {
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
-    kShadowLevelsHorizons, kLight, kLightImage, kTonemap, kView;
+    kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -45,11 +47,14 @@ struct TileInputs {
     Buffer lights;       // LightRecord
     Buffer ggx_table;
     Buffer environment;  // EnvironmentMap::words; a dummy unless image_sky
+    Buffer light_rects;  // LightRect a light
     uint32_t light_count = 0;
-    rhi::Extent size;       // of the tile
-    bool exact = false;     // some code is marched: analytic, or edits leave the grid
-    bool analytic = false;  // … instead of the bricks
-    bool horizons = false;  // exact code is half-spaces outside the grid, no more
+    uint32_t lights_of_tile = 0;  // at most
+    bool local_lights = false;    // some light ends somewhere
+    rhi::Extent size;             // of the tile
+    bool exact = false;           // some code is marched: analytic, or edits leave the grid
+    bool analytic = false;        // … instead of the bricks
+    bool horizons = false;        // exact code is half-spaces outside the grid, no more
     bool image_sky = false;
     bool levels = false;  // the field is a clipmap
     bool refine = false;  // by the device: the host may do it
@@ -63,6 +68,14 @@ struct TileInputs {
     InstanceHandles instances;  // none where the frame has none
     bool has_instances = false;
     TapeUse use_of_instances;
+    bool taa = false;
+    bool has_history = false;  // the frame before is the one that `motion` leads to
+    Block motion;              // MotionParams, with taa
+    Buffer outlines;           // OutlineRecord, where outline_count is above 0
+    Buffer outline_code;
+    uint32_t outline_count = 0;
+    float widest_outline = 0;
+    TapeUse use_of_outlines;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -88,11 +101,36 @@ std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams&
 
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
-// Visible fractions of the discs of lights push.first_light … + 3, a channel each.
-Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push);
+// Which lights may reach which tile; see cluster.comp and light_walk.glsl.
+Buffer cluster(Graph& g, const TileInputs& in, const Image& visibility);
+// Visible fractions of the discs of lights push.first_light … + 15 of each tile's list, a byte each.
+Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Buffer& masks,
+             const ShadowPush& push);
 const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure.
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+
+// Where each pixel's surface was in the frame before; see motion.comp.
+Image motion(Graph& g, const TileInputs& in, const Image& visibility);
+// With what the frames before saw of the same places; see taa.comp.
+Image taa(Graph& g, const TileInputs& in, const Image& radiance, const Image& depth, const Image& motion);
+
+// Outlined edits, each with its own code.
+struct OutlineCode {
+    std::vector<OutlineRecord> records;
+    std::vector<sdf::Instruction> code;
+    float widest = 0;
+    int left_out = 0;  // no code for a GPU
+};
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program);
+struct OutlineMask {
+    Image owners, seeds;
+};
+OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility);
+// Seeds of the pixels that lines reach.
+Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest);
+// The picture with its lines.
+Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Image& shown);
 
 // The exposure that this picture asks for, from its histogram.
 void expose(Graph& g, const Image& radiance, Buffer& exposure, float seconds, float correction);

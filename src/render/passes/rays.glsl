@@ -7,6 +7,11 @@ vec3 camera_direction(ivec2 pixel) {
     return camera_direction_at(frame.camera, float(pixel.x) + 0.5, float(pixel.y) + 0.5);
 }
 
+// World metres of what a pixel sees. Whoever lights it calls this, so that all mean the same point.
+vec3 seen_point(TexelRay ray, uvec4 seen) {
+    return (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * frame.grid.voxel_size;
+}
+
 TexelRay pixel_ray(ivec2 pixel) {
     if ((frame.flags & kFrameRays) != 0u) {
         FrameRay r = rays[pixel.y * frame.tile_width + pixel.x];

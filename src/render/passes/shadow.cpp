@@ -26,11 +26,13 @@ const Kernel& shadow_kernel(const TileInputs& in) {
     return specialised(in.horizons ? kShadowHorizons : kShadowExact, in.use);
 }
 
-Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const ShadowPush& push) {
-    Image fractions = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
+Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Buffer& masks,
+             const ShadowPush& push) {
+    Image fractions = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     const FieldHandles& f = in.field;
-    std::vector<Use> uses{g.uniform(in.frame),    g.read(f.cells),    g.read(in.rays),       g.read(in.lights),
-                          g.sampled(f.distances), g.read(visibility), g.read(surface.words), g.write(fractions)};
+    std::vector<Use> uses{g.uniform(in.frame),   g.read(f.cells),        g.read(in.rays),
+                          g.read(in.lights),     g.sampled(f.distances), g.read(visibility),
+                          g.read(surface.words), g.write(fractions),     g.read(masks)};
     if (in.exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
     if (in.levels) uses.push_back(g.uniform(in.levels_block));
     g.dispatch(shadow_kernel(in), in.size, uses, push);

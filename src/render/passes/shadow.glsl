@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// How much of each light's disc a point sees: four lights at a time, a channel each. Rays start one voxel off the surface and sample
+// How much of each light's disc a point sees: sixteen lights of its tile's list at a time, a byte each. Rays start one voxel off the surface and sample
 // the bricks (a trilinear value less kTrilinearErrorVoxels is what a step may trust); with KILN_EXACT, exact programs where they apply.
 
 #include "render/passes/shadow.gpu.h"
@@ -14,18 +14,19 @@ layout(set = 0, binding = 4) uniform texture3D distances;
 layout(set = 0, binding = 5) uniform sampler distance_sampler;
 layout(set = 0, binding = 6) uniform utexture2D visibility;
 layout(set = 0, binding = 7) uniform utexture2D surface_words;
-layout(set = 0, binding = 8, rgba8) writeonly uniform image2D visible_fractions;
+layout(set = 0, binding = 8, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 9, std430) readonly buffer LightMasks { uint light_masks[]; };
 #ifdef KILN_EXACT
-layout(set = 0, binding = 9, std430) readonly buffer Records { BrickRecord records[]; };
-layout(set = 0, binding = 10, std430) readonly buffer Code { uvec2 code[]; };
-layout(set = 0, binding = 11, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
-layout(set = 0, binding = 12, std430) readonly buffer Numbers { float numbers[]; };
+layout(set = 0, binding = 10, std430) readonly buffer Records { BrickRecord records[]; };
+layout(set = 0, binding = 11, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 12, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 13, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 #ifdef KILN_LEVELS
 #ifdef KILN_EXACT
-const uint kLevelsBinding = 13u;
+const uint kLevelsBinding = 14u;
 #else
-const uint kLevelsBinding = 9u;
+const uint kLevelsBinding = 10u;
 #endif
 layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
 #endif
@@ -38,6 +39,7 @@ layout(constant_id = 5) const bool kAlongCode = true;
 #endif
 #include "render/passes/map.glsl"
 #include "render/passes/rays.glsl"
+#include "render/passes/light_walk.glsl"
 #include "render/passes/surface.glsl"
 #include "render/passes/grid_stretch.glsl"
 #ifdef KILN_EXACT
@@ -152,7 +154,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
     uvec4 seen = texelFetch(visibility, pixel, 0);
-    vec4 fractions = vec4(0.0);
+    uvec4 fractions = uvec4(0u);
     uint state = seen.y >> 28u;
     if (state != kSeenNothing && state != kSeenInside) {
         SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
@@ -164,10 +166,11 @@ void main() {
         vec3 from = ray.part + ray.direction * t + surface.normal * off;
         shadow_whole = ray.whole + ivec3(floor(from));
         vec3 p = from - floor(from);
-        vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * h;
-        for (int channel = 0; channel < int(kLightsAtOnce); ++channel) {
-            uint index = push.first_light + uint(channel);
-            if (index >= frame.light_count) break;
+        vec3 p_world = seen_point(ray, seen);
+        LightWalk walk = light_walk(pixel, push.first_light);
+        for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
+            uint index = next_light(walk);
+            if (index == kNoLight) break;
             LightSample light = sample_light(lights[index], p_world);
             vec3 l = light.l;
             if (dot(l, surface.normal) <= 0.0 || largest3(light.illuminance) <= 0.0) continue;
@@ -183,7 +186,7 @@ void main() {
 #ifdef KILN_EXACT
             if (concave && fraction > 0.0) fraction *= above_horizons(p, l, light.tan_radius, light.distance / h);
 #endif
-            fractions[channel] = fraction;
+            set_visible_fraction(fractions, channel, fraction);
         }
     }
     imageStore(visible_fractions, pixel, fractions);

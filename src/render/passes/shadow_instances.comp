@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// What instances hide of each light's disc, multiplied into the fractions that the field leaves visible: four lights at a time. The cone
+// What instances hide of each light's disc, multiplied into the fractions that the field leaves visible: those lights of a tile's list. The cone
 // around the disc goes down the tree; each object it meets is asked in its own voxels. Hard shadows are the march of primary rays.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -22,13 +22,15 @@ layout(set = 0, binding = 8) uniform texture3D distances;
 layout(set = 0, binding = 9) uniform sampler distance_sampler;
 layout(set = 0, binding = 10) uniform utexture2D visibility;
 layout(set = 0, binding = 11) uniform utexture2D surface_words;
-layout(set = 0, binding = 12) uniform texture2D fractions_before;
-layout(set = 0, binding = 13, rgba8) writeonly uniform image2D visible_fractions;
+layout(set = 0, binding = 12) uniform utexture2D fractions_before;
+layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 14, std430) readonly buffer LightMasks { uint light_masks[]; };
 layout(push_constant) uniform Push { InstancePush push; };
 
 #define KILN_INSTANCE_WALK
 #include "render/passes/instances.glsl"
 #include "render/passes/rays.glsl"
+#include "render/passes/light_walk.glsl"
 #include "render/passes/surface.glsl"
 #include "render/passes/shadow_bricks.glsl"
 
@@ -120,7 +122,7 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
     uvec4 seen = texelFetch(visibility, pixel, 0);
-    vec4 fractions = texelFetch(fractions_before, pixel, 0);
+    uvec4 fractions = texelFetch(fractions_before, pixel, 0);
     uint state = seen.y >> 28u;
     if (state != kSeenNothing && state != kSeenInside) {
         SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
@@ -130,12 +132,15 @@ void main() {
         if (state == kSeenInstance) voxel = 1.0 / instances[seen.y & 0x0fffffffu].voxels;
         vec3 p = from_eye(ray) + ray.direction * t + surface.normal * shadow_offset(state, voxel, t);
         vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * frame.grid.voxel_size;
-        for (int channel = 0; channel < int(kLightsAtOnce); ++channel) {
-            uint index = push.first_light + uint(channel);
-            if (index >= frame.light_count) break;
-            if (fractions[channel] <= 0.0) continue;
+        LightWalk walk = light_walk(pixel, push.first_light);
+        for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
+            uint index = next_light(walk);
+            if (index == kNoLight) break;
+            float before = visible_fraction(fractions, channel);
+            if (before <= 0.0) continue;
             LightSample light = sample_light(lights[index], p_world);
-            fractions[channel] *= visible_past_instances(p, light.l, light.tan_radius, light.distance / frame.grid.voxel_size);
+            float left = visible_past_instances(p, light.l, light.tan_radius, light.distance / frame.grid.voxel_size);
+            set_visible_fraction(fractions, channel, before * left);
         }
     }
     imageStore(visible_fractions, pixel, fractions);

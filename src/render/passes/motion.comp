@@ -1,0 +1,46 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// Where each pixel's surface was on the screen: x, y: pixels from this frame to the frame before (x right, y down); z: its distance from
+// the eye then over now. The sky turns with the camera and does not move. Half floats: 1/1024 of a motion.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#include "render/passes/motion.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std140) uniform Motion { MotionParams cameras; };
+layout(set = 0, binding = 2, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 3) uniform utexture2D visibility;
+layout(set = 0, binding = 4, rgba16f) writeonly uniform image2D motion;
+
+#include "render/passes/rays.glsl"
+#include "render/passes/point_before.glsl"
+
+const vec2 kOffScreen = vec2(60000.0);
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    uvec4 seen = texelFetch(visibility, pixel, 0);
+    uint state = seen.y >> 28u;
+    TexelRay ray = pixel_ray(pixel);
+    vec3 now = ray.direction;
+    vec3 before = ray.direction;
+    vec3 moved = vec3(0.0);
+    if (state != kSeenNothing) {
+        vec3 p_world = seen_point(ray, seen);
+        moved = point_before(state, seen, p_world) - p_world;
+        now *= uintBitsToFloat(seen.x) * frame.grid.voxel_size;
+        before = now + moved + vec3(cameras.moved_x, cameras.moved_y, cameras.moved_z);
+    }
+    vec2 by = vec2(0.0);
+    // The same point through the same camera is no motion, whatever the compiler made of the two projections.
+    if (cameras.still == 0u || moved != vec3(0.0)) {
+        by = dot(before, cameras.before.forward.xyz) > 0.0 ? camera_pixel(cameras.before, before) - camera_pixel(cameras.now, now) : kOffScreen;
+        by = clamp(by, -kOffScreen, kOffScreen);
+    }
+    float grown = state == kSeenNothing ? 1.0 : length(before) / max(length(now), 1e-20);
+    imageStore(motion, pixel, vec4(by, min(grown, 60000.0), 0.0));
+}

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/outline.gpu.h"
+#include "render/passes/passes.h"
+
+#include "shaders/outline_draw.spv.h"
+#include "shaders/outline_flood.spv.h"
+#include "shaders/outline_mask.spv.h"
+
+#include <algorithm>
+
+namespace kiln::render {
+
+const Kernel kOutlineMask{"outline mask", kOutlineMaskSpv};
+const Kernel kOutlineFlood{"outline flood", kOutlineFloodSpv};
+const Kernel kOutlineDraw{"outline draw", kOutlineDrawSpv};
+
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program) {
+    OutlineCode out;
+    for (const EditOutline& o : outlines) {
+        if (o.row >= program.edits.size()) continue;
+        const sdf::EditSpan& row = program.edits[o.row];
+        if (row.count == 0) continue;
+        const uint32_t first = uint32_t(out.code.size());
+        bool on_gpu = true;
+        for (uint32_t i = 0; i + 1 < row.count; ++i) {  // the last combines it with the world
+            out.code.push_back(program.code[row.first + i]);
+            on_gpu = on_gpu && !out.code.back().cpu_only();
+        }
+        if (!on_gpu) {
+            out.code.resize(first);
+            ++out.left_out;
+            continue;
+        }
+        out.code.push_back(sdf::Instruction::make(sdf::Opcode::Move, 0, 0, 1, 0, 0));
+        OutlineRecord r{};
+        r.red = o.outline.color.x, r.green = o.outline.color.y, r.blue = o.outline.color.z;
+        r.width_px = o.outline.width_px;
+        r.code_first = first;
+        r.code_count = uint32_t(out.code.size()) - first;
+        r.blend = 0.25f * row.blend;
+        r.paints = row.op == Op::Paint ? 1 : 0;
+        out.records.push_back(r);
+        out.widest = std::max(out.widest, o.outline.width_px);
+    }
+    return out;
+}
+
+OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility) {
+    OutlineMask out;
+    out.owners = g.create("outline owners", {.size = in.size, .format = rhi::Format::R32Uint});
+    out.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
+    const OutlinePush push{int(in.size.width), int(in.size.height), 0, in.outline_count};
+    g.dispatch(
+        specialised(kOutlineMask, in.use_of_outlines), in.size,
+        {g.uniform(in.frame), g.read(in.rays), g.read(in.field.code), g.read(in.outline_code), g.read(in.field.numbers),
+         g.read(in.outlines), g.read(visibility), g.write(out.owners), g.write(out.seeds)},
+        push);
+    return out;
+}
+
+Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest) {
+    int step = 1;
+    while (float(step) < widest + 1) step *= 2;
+    Image seeds = mask.seeds;
+    const auto flood = [&](int by) {
+        Image next = g.create("outline seeds", {.size = seeds.size, .format = rhi::Format::R32Uint});
+        g.dispatch(kOutlineFlood, seeds.size, {g.read(records), g.read(mask.owners), g.read(seeds), g.write(next)},
+                   OutlinePush{int(seeds.size.width), int(seeds.size.height), by, 0});
+        seeds = next;
+    };
+    // A step of one before and after leaves hardly a pixel with another seed than the nearest.
+    flood(1);
+    for (; step > 0; step /= 2) flood(step);
+    flood(1);
+    return seeds;
+}
+
+Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Image& shown) {
+    const OutlineMask mask = outline_mask(g, in, visibility);
+    const Image seeds = outline_flood(g, in.outlines, mask, in.widest_outline);
+    Image out = g.create("shown outlined", {.size = shown.size, .format = rhi::Format::Rgba8Unorm});
+    g.dispatch(kOutlineDraw, shown.size,
+               {g.read(in.outlines), g.read(mask.owners), g.read(seeds), g.read(shown), g.write(out)},
+               OutlinePush{int(shown.size.width), int(shown.size.height), 0, 0});
+    return out;
+}
+
+}  // namespace kiln::render

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/taa.gpu.h"
+#include "render/passes/passes.h"
+
+#include "shaders/motion.spv.h"
+#include "shaders/taa.spv.h"
+
+namespace kiln::render {
+
+const Kernel kMotion{"motion", kMotionSpv};
+const Kernel kTaa{"taa", kTaaSpv};
+
+Image motion(Graph& g, const TileInputs& in, const Image& visibility) {
+    Image out = g.create("motion", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    g.dispatch(kMotion, in.size,
+               {g.uniform(in.frame), g.uniform(in.motion), g.read(in.rays), g.read(visibility), g.write(out)});
+    return out;
+}
+
+Image taa(Graph& g, const TileInputs& in, const Image& radiance, const Image& depth, const Image& motion) {
+    ImageHistory colors = g.history("taa radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    ImageHistory depths = g.history("taa depth", {.size = in.size, .format = rhi::Format::R32Float});
+    Image out = g.create("radiance smoothed", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    const TaaPush push{.width = int(in.size.width),
+                       .height = int(in.size.height),
+                       .valid = in.has_history && colors.valid && depths.valid ? 1u : 0u,
+                       .pad_0 = 0};
+    g.dispatch(kTaa, in.size,
+               {g.read(radiance), g.read(depth), g.read(motion), g.read(colors.previous), g.read(depths.previous),
+                g.write(colors.current), g.write(depths.current), g.write(out)},
+               push);
+    return out;
+}
+
+}  // namespace kiln::render

@@ -1,0 +1,234 @@
+// SPDX-License-Identifier: MIT
+// Outlines: lines of constant width against the exact distance to what they surround, and whose a point is against both operands.
+#include "gpu_worlds.h"
+#include "render/lib/color.gpu.h"
+#include "render/lib/pack.h"
+#include "render/passes/outline.gpu.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace kiln::render {
+namespace {
+
+constexpr int kWidth = 96, kHeight = 80;
+
+struct OutlineGpu : GpuTest {
+    // Lines round `owner` (number + 1 of a record, 0 outside) as shares of pixels, drawn in red on black.
+    std::vector<uint32_t> flooded_seeds;
+    std::vector<float> covered(const std::vector<uint32_t>& owner, const std::vector<float>& widths) {
+        std::vector<OutlineRecord> records;
+        for (const float w : widths) {
+            OutlineRecord& r = records.emplace_back();
+            r.red = 1;
+            r.width_px = w;
+        }
+        std::vector<uint32_t> seeds(owner.size());
+        for (uint32_t i = 0; i < owner.size(); ++i) seeds[i] = owner[i] == 0 ? kNoSeed : i % kWidth | i / kWidth << 16;
+        Graph g(*runner_);
+        const auto image_of = [&](std::string_view name, const std::vector<uint32_t>& words) {
+            std::vector<uint32_t> rows(128 * size_t{kHeight});  // rows of whole 256 bytes
+            for (size_t i = 0; i < words.size(); ++i) rows[i / kWidth * 128 + i % kWidth] = words[i];
+            Image out = g.create(name, {.size = {kWidth, kHeight}, .format = rhi::Format::R32Uint});
+            const CopyRegion all{.bytes_per_row = 512, .rows_per_layer = kHeight, .size = {kWidth, kHeight}};
+            g.copy(g.upload(name, std::span<const uint32_t>(rows)), out, std::span(&all, 1));
+            return out;
+        };
+        OutlineMask mask;
+        mask.owners = image_of("owners", owner);
+        mask.seeds = image_of("seeds", seeds);
+        Buffer buffer = g.upload("outlines", std::span<const OutlineRecord>(records));
+        const Image flooded = outline_flood(g, buffer, mask, *std::max_element(widths.begin(), widths.end()));
+        Image shown = g.create("shown", {.size = {kWidth, kHeight}, .format = rhi::Format::Rgba8Unorm});
+        g.clear(shown);
+        Image drawn = g.create("drawn", {.size = {kWidth, kHeight}, .format = rhi::Format::Rgba8Unorm});
+        g.dispatch(kOutlineDraw, shown.size,
+                   {g.read(buffer), g.read(mask.owners), g.read(flooded), g.read(shown), g.write(drawn)},
+                   OutlinePush{kWidth, kHeight, 0, 0});
+        const Readback bytes = g.readback(drawn), ends = g.readback(flooded);
+        rhi::must(runner_->execute(g));
+        flooded_seeds = rhi::must(ends.get_as<uint32_t>());
+        std::vector<float> out;
+        for (const uint32_t pixel : rhi::must(bytes.get_as<uint32_t>()))
+            out.push_back(shade::linear_from_srgb(float(pixel & 255u) / 255));
+        return out;
+    }
+    template <typename Inside>
+    static std::vector<uint32_t> mask_of(Inside&& inside) {
+        std::vector<uint32_t> out;
+        for (int y = 0; y < kHeight; ++y)
+            for (int x = 0; x < kWidth; ++x) out.push_back(uint32_t(inside(double(x) + 0.5, double(y) + 0.5)));
+        return out;
+    }
+};
+
+// Every pixel, by looking at every pixel inside.
+TEST_F(OutlineGpu, LinesEndWhereTheExactDistanceSays) {
+    const auto star = [](double x, double y) {
+        const double dx = x - 44, dy = y - 38;
+        return std::hypot(dx, dy) < 14 + 8 * std::cos(5 * std::atan2(dy, dx)) ? 1 : 0;
+    };
+    const auto two = [&](double x, double y) {
+        // A corner, a single pixel and a star, of two widths.
+        if (std::fabs(x - 80) < 6 && std::fabs(y - 66) < 5) return 2;
+        if (std::fabs(x - 10.5) < 0.5 && std::fabs(y - 70.5) < 0.5) return 2;
+        return star(x, y);
+    };
+    for (const std::vector<float>& widths : {std::vector<float>{3, 5}, {1, 12}, {24, 2.5f}}) {
+        const std::vector<uint32_t> owner = mask_of(two);
+        const std::vector<float> seen = covered(owner, widths);
+        int off = 0, line = 0;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            const auto past = [&](size_t j) {
+                const double far = std::hypot(i % kWidth - int(j) % kWidth, i / kWidth - int(j) / kWidth);
+                return far - double(widths[owner[j] - 1]);
+            };
+            double least = 1e9;
+            for (size_t j = 0; j < owner.size(); ++j)
+                if (owner[j] != 0) least = std::min(least, past(j));
+            const bool outside = owner[size_t(i)] == 0;
+            // Nothing farther off is drawn, and what is drawn there may be half a pixel off where the mask has steps.
+            if (least > 1) {
+                EXPECT_EQ(seen[size_t(i)], 0) << i % kWidth << ", " << i / kWidth;
+                continue;
+            }
+            if (outside && least < -1) {
+                EXPECT_EQ(seen[size_t(i)], 1) << i % kWidth << ", " << i / kWidth;
+            }
+            ++line;
+            const uint32_t seed = flooded_seeds[size_t(i)];
+            ASSERT_NE(seed, kNoSeed) << i % kWidth << ", " << i / kWidth;
+            const double found = past((seed >> 16) * kWidth + (seed & 0xffffu));
+            EXPECT_LE(found, least + 0.5) << i % kWidth << ", " << i / kWidth;
+            off += found > least + 1e-4;
+        }
+        EXPECT_GT(line, 200);
+        EXPECT_LE(off, line / 500) << "of " << line;
+    }
+}
+
+TEST_F(OutlineGpu, AnEdgeAndADiscHaveLinesOfTheirWidth) {
+    for (const float width : {1.0f, 2.5f, 7.0f}) {
+        const std::vector<float> edge = covered(mask_of([](double x, double) { return x < 40 ? 1 : 0; }), {width});
+        double row = 0;
+        for (int x = 0; x < kWidth; ++x) row += double(edge[size_t(20 * kWidth + x)]);
+        EXPECT_NEAR(row, width, 0.02);
+        // Straight edges of other slopes, measured along them.
+        for (const double degrees : {10.0, 26.0, 45.0, 61.0}) {
+            const double nx = std::cos(degrees * std::numbers::pi / 180),
+                         ny = std::sin(degrees * std::numbers::pi / 180);
+            double sum = 0;
+            const std::vector<float> slope = covered(
+                mask_of([&](double x, double y) { return nx * (x - 48) + ny * (y - 40) < 0.1 ? 1 : 0; }), {width});
+            for (int y = 0; y < kHeight; ++y) {
+                for (int x = 0; x < kWidth; ++x) {
+                    const double along = -ny * (x + 0.5 - 48) + nx * (y + 0.5 - 40);
+                    if (std::fabs(along) < 22) sum += double(slope[size_t(y * kWidth + x)]);
+                }
+            }
+            EXPECT_NEAR(sum / 44, width, 0.2) << degrees << " degrees";
+        }
+        const std::vector<uint32_t> disc =
+            mask_of([](double x, double y) { return std::hypot(x - 48, y - 40) < 25 ? 1 : 0; });
+        double area = 0, ring = 0;
+        for (const uint32_t o : disc) area += o;
+        for (const float c : covered(disc, {width})) ring += double(c);
+        const double radius = std::sqrt(area / std::numbers::pi);
+        EXPECT_NEAR(std::sqrt((area + ring) / std::numbers::pi) - radius, width, 0.15);
+    }
+}
+
+// Two balls: one outlined. Its points are those where its own distance is the lesser, through a blend too.
+TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
+    for (const float blend : {0.0f, 0.3f}) {
+        const vec3 a{-0.25f, 0, 0}, b{0.3f, 0.1f, 0.1f};
+        const float ra = 0.45f, rb = 0.4f;
+        field::worlds::World world{
+            "two balls",
+            {field::worlds::edit(Sphere{.radius = ra}, a), field::worlds::edit(Sphere{.radius = rb}, b)},
+            {.voxel_size = 0.03f, .bounds = {{-1, -1, -1}, {1, 1, 1}}}};
+        world.edits[1].blend_radius = blend;
+        Frame frame = frame_of(world, {0.3f, 0.8f, 2.5f});
+        const sdf::Program& program = frame.field->program();
+        const std::vector<EditOutline> outlined{{program.rows()[1], Outline{}}};
+        const OutlineCode code = outline_code(outlined, program);
+        ASSERT_EQ(code.records.size(), 1u);
+        GpuField gpu(*runner_);
+        rhi::must(gpu.update(frame.field, Baker::Host));
+        const FrameParams p =
+            rhi::must(frame_params(frame, {.width = kWidth, .height = kHeight, .refine = false}, gpu));
+        Graph g(*runner_);
+        TileInputs in;
+        in.field = gpu.import(g);
+        in.frame = g.block(p);
+        const FrameRay no_ray{};
+        in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
+        in.size = {kWidth, kHeight};
+        in.outlines = g.upload("outlines", std::span<const OutlineRecord>(code.records));
+        in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(code.code));
+        in.outline_count = 1;
+        in.use_of_outlines = tape_use(code.code);
+        const Visibility seen = march(g, in);
+        const OutlineMask mask = outline_mask(g, in, seen.words);
+        const Readback owners = g.readback(mask.owners), words = g.readback(seen.words);
+        rhi::must(runner_->execute(g));
+        const std::vector<uint32_t> owner = rhi::must(owners.get_as<uint32_t>()),
+                                    visibility = rhi::must(words.get_as<uint32_t>());
+        int ours = 0, theirs = 0, close = 0;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            const uint32_t* const w = visibility.data() + 4 * size_t(i);
+            if (w[1] >> 28 == kSeenNothing) {
+                EXPECT_EQ(owner[size_t(i)], 0u);
+                continue;
+            }
+            float t = 0;
+            std::memcpy(&t, w, 4);
+            const vec3 d = shade::camera_direction_at(p.camera, float(i % kWidth) + 0.5f, float(i / kWidth) + 0.5f);
+            const vec3 at = frame.camera.position + d * (t * p.grid.voxel_size);
+            const float to_a = length(at - a) - ra, to_b = length(at - b) - rb;
+            // Within a voxel of the border either answer will do.
+            if (std::fabs(to_a - to_b) < 0.045f) {
+                ++close;
+                continue;
+            }
+            EXPECT_EQ(owner[size_t(i)], to_b < to_a ? 1u : 0u) << i % kWidth << ", " << i / kWidth;
+            (to_b < to_a ? ours : theirs) += 1;
+        }
+        EXPECT_GT(ours, 200);
+        EXPECT_GT(theirs, 200);
+        EXPECT_LT(close, ours);
+    }
+}
+
+// As users have it: the line is as wide near by as far off, and what is behind something has none there.
+TEST_F(OutlineGpu, AreTheSameFromEveryDistance) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP() << "no Vulkan device";
+    for (const float far : {2.0f, 6.0f}) {
+        Frame frame = frame_of(field::worlds::sphere_of(10), {0, 0, far});
+        frame.camera.target = {0, 0, 0};
+        const Picture plain = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        frame.outlines = {{frame.field->program().rows()[0], Outline{.color = {1, 0, 0}, .width_px = 4}}};
+        const Picture lined = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        EXPECT_EQ(lined.rgba, plain.rgba);
+        double area = 0, changed = 0;
+        for (size_t i = 0; i < plain.depth.size(); ++i) {
+            const bool inside = std::isfinite(plain.depth[i]);
+            area += inside;
+            const bool same =
+                std::equal(lined.srgb.begin() + ptrdiff_t(4 * i), lined.srgb.begin() + ptrdiff_t(4 * i + 4),
+                           plain.srgb.begin() + ptrdiff_t(4 * i));
+            if (inside) {
+                EXPECT_TRUE(same) << i;
+            }
+            if (inside || same) continue;
+            changed += lined.srgb[4 * i] == 255 && lined.srgb[4 * i + 1] == 0 ? 1.0 : 0.5;
+        }
+        const double radius = std::sqrt(area / std::numbers::pi);
+        EXPECT_GT(radius, 3);
+        EXPECT_NEAR(std::sqrt((area + changed) / std::numbers::pi) - radius, 4, 0.25) << far;
+    }
+}
+
+}  // namespace
+}  // namespace kiln::render
