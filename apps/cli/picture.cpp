@@ -124,6 +124,13 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         .number("load_s", load)
         .number("total_s", total);
     if (!stats.levels.empty()) json.raw("levels", levels_json(stats));
+    if (stats.triangles > 0)
+        json.number("triangles", double(stats.triangles))
+            .number("triangles_drawn", double(stats.triangles_drawn))
+            .number("triangles_culled", double(stats.triangles - stats.triangles_drawn));
+    std::string faults;
+    for (const std::string& fault : world.faults()) faults += (faults.empty() ? "" : ", ") + Json::quoted(fault);
+    if (!faults.empty()) json.raw("faults", "[" + faults + "]");
     add_journal(json, world);
     return json.line();
 }
@@ -230,6 +237,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);
     if (!frame) return progress.stage(""), fail(frame.error());
+    frame->time = frame->time_before = o.time;
     const double load = total.seconds();
 
     Result<Picture> picture = Error{};
@@ -255,6 +263,8 @@ int render_picture(const PictureOptions& o) {
         if (o.transcript) introduce(stats);
         std::string later;
         for (const std::string& section : world->not_drawn_yet()) later += (later.empty() ? "" : ", ") + section;
+        for (const std::string& note : world->model_notes()) say("note     " + note);
+        for (const std::string& fault : world->faults()) say("fault    " + fault + "; left out");
         if (!later.empty()) say("note     this version does not draw: " + later);
         if (frame->coarsened > 0)
             say("note     too large for the brick pool: drawn with voxels " +

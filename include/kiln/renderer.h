@@ -21,6 +21,9 @@ namespace field {
 class Clipmap;
 class Field;
 }  // namespace field
+namespace model {
+struct Drawable;
+}
 namespace render::shade {
 struct EnvironmentMap;
 }
@@ -69,6 +72,12 @@ struct Environment {
 
 enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };
 
+/// A triangle mesh in the world.
+struct MeshInstance {
+    std::shared_ptr<const model::Drawable> model;  ///< immutable
+    Transform transform, before;                   ///< world from model: now, and in the frame before (for motion)
+};
+
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
     std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
@@ -79,6 +88,8 @@ struct Frame {
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
     int coarsened = 0;  ///< times the voxel size was doubled to fit the pool
+    std::vector<MeshInstance> meshes;
+    double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
 };
 
 struct RenderSettings {
@@ -125,6 +136,8 @@ struct RenderStats {
         bool skipped = false;                          ///< its shell was more than the budget
     };
     std::vector<Level> levels;
+    uint64_t triangles = 0;        ///< of meshes, in the scene
+    uint64_t triangles_drawn = 0;  ///< given to the rasteriser
 };
 
 struct DeviceInfo {

@@ -112,9 +112,11 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
     return out;
 }
 
-TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image& refined) {
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image words, const Image& refined) {
     TileResult out;
-    const Surface surface = resolve(g, in, words, refined);
+    if (in.has_meshes) words = see_meshes(g, in, words, refined);
+    Surface surface = resolve(g, in, words, refined);
+    if (in.has_meshes) resolve_meshes(g, in, surface);
     if (wanted == View::Shaded) {
         const Image radiance = light(g, in, surface.seen, surface);
         out.radiance = g.readback(radiance);
@@ -162,11 +164,13 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
+    if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;
     }
     out.push_back(&shadow_kernel(in));
+    if (in.has_meshes) out.push_back(&kMeshShadow);
     out.push_back(&light_kernel(in));
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
@@ -175,6 +179,11 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
     return out;
+}
+
+std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
+    if (!in.has_meshes) return {};
+    return {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
 }
 
 }  // namespace kiln::render

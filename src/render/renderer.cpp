@@ -36,6 +36,7 @@ struct Renderer::Impl {
     std::unique_ptr<rhi::Device> device;
     std::unique_ptr<Runner> runner;
     std::unique_ptr<GpuField> field;
+    std::unique_ptr<GpuMeshes> meshes;
     std::string fault;  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
@@ -46,6 +47,7 @@ struct Renderer::Impl {
 
     ~Impl() {
         field.reset();
+        meshes.reset();
         for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
             if (!runner || !buffer) continue;
             runner->forget(buffer);
@@ -88,6 +90,7 @@ struct Renderer::Impl {
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
+        in.has_meshes = !meshes->empty();
         return in;
     }
     void add_times(const FrameTimes& times);
@@ -105,6 +108,7 @@ Result<void> Renderer::Impl::prepare() {
     });
     runner = std::make_unique<Runner>(*device);
     field = std::make_unique<GpuField>(*runner);
+    meshes = std::make_unique<GpuMeshes>(*runner);
     const std::span<const uint32_t> table = shade::ggx_albedo_table();
     auto buffer = device->create_buffer({.size = table.size_bytes(), .label = "ggx albedo"});
     if (!buffer) return buffer.error();
@@ -170,6 +174,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        in.meshes = meshes->import(g);
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -250,11 +255,13 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                               : field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto);
         !updated)
         return updated.error();
-    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
-        return warm.error();
-
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
+    if (auto brought = meshes->update(frame); !brought) return brought.error();
+    const TileInputs switches = inputs(frame, settings);
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
+        !warm)
+        return warm.error();
     params->sky = shade::sky_params(frame);
     if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
@@ -301,6 +308,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
+    stats.triangles = stats.triangles_drawn = meshes->triangles();
     if (runner->pipelines().made_late() != late)
         log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
     if (auto ok = healthy(); !ok) return ok.error();

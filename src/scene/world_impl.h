@@ -9,6 +9,7 @@
 #include "scene/history.h"
 #include "scene/journal.h"
 #include "scene/scene_file.h"
+#include "scene/scene_meshes.h"
 #include "scene/sky_image.h"
 
 #include "base/paged_array.h"
@@ -125,6 +126,7 @@ struct World::Impl {
     FieldSettings levels_with;
     std::vector<field::RowChange> level_changes;  ///< since `levels`
     scene::Grids grids;
+    scene::SceneMeshes meshes;
 
     /// The image of the environment: read when its name is first met, brought into shape when it is first drawn.
     struct SkyImage {

@@ -72,6 +72,7 @@ KILN_CONST uint kSeenInside = 2u;   // solid without a brick: the camera is in i
 KILN_CONST uint kSeenPruned = 3u;   // exact code of brick `slot`
 KILN_CONST uint kSeenOutside = 4u;  // exact code of what leaves the grid
 KILN_CONST uint kSeenProgram = 5u;  // exact code of the whole program
+KILN_CONST uint kSeenMesh = 6u;     // triangle `slot` of the frame's meshes; z: the part it belongs to
 
 #ifdef __cplusplus
 static_assert(sizeof(FrameParams) == 256 && sizeof(FrameRay) == 48 && sizeof(MaterialRecord) == 32);

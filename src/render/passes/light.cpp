@@ -19,7 +19,8 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
     uint32_t first = 0;
     do {
         const ShadowPush push{.first_light = first, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0};
-        const Image fractions = shadow(g, in, visibility, surface, push);
+        Image fractions = shadow(g, in, visibility, surface, push);
+        if (in.has_meshes) fractions = shadow_meshes(g, in, surface, fractions, push);
         Image sum = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
         g.dispatch(light_kernel(in), in.size,
                    {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table),

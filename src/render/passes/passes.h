@@ -3,6 +3,7 @@
 #pragma once
 
 #include "render/gpu_field.h"
+#include "render/gpu_meshes.h"
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
@@ -19,6 +20,8 @@ extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
     kShadowLevelsHorizons, kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
+extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -59,6 +62,8 @@ struct TileInputs {
     float elapsed = 0;  // seconds since the picture before
     TapeUse use;        // of the code that is marched and resolved
     TapeUse use_of_bricks;
+    MeshHandles meshes;
+    bool has_meshes = false;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -81,6 +86,14 @@ Image refine(Graph& g, const TileInputs& in, const Image& visibility);
 // The same words from the same visibility words, made here: software devices run the tape many times slower.
 std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams& frame,
                                      std::span<const uint32_t> visibility);
+
+// Visibility words where meshes that are nearer than the field are seen.
+Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+// Fills in the surface where meshes are seen.
+void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
+// The fractions, less what meshes hide.
+Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Image& fractions,
+                    const ShadowPush& push);
 
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
