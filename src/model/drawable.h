@@ -21,10 +21,10 @@ struct Triangles;
 
 struct Vertex {
     vec3 position;
-    vec3 normal{0, 1, 0};          ///< unit
-    vec4 tangent{1, 0, 0, 1};      ///< unit; w: +1 or -1, bitangent = cross(normal, tangent) w
-    std::array<vec2, 2> uv{};      ///< two sets
-    vec4 color{1, 1, 1, 1};        ///< linear, multiplies the base colour
+    vec3 normal{0, 1, 0};      ///< unit
+    vec4 tangent{1, 0, 0, 1};  ///< unit; w: +1 or -1, bitangent = cross(normal, tangent) w
+    std::array<vec2, 2> uv{};  ///< two sets
+    vec4 color{1, 1, 1, 1};    ///< linear, multiplies the base colour
 };
 
 /// 8 bits a channel, top row first.
@@ -41,8 +41,9 @@ struct TextureUse {
     int32_t image = -1;  ///< none
     uint8_t uv_set = 0;
     Wrap wrap_u = Wrap::Repeat, wrap_v = Wrap::Repeat;
-    bool nearest = false;                         ///< magnified texels stay squares
-    std::array<float, 6> map{1, 0, 0, 1, 0, 0};  ///< u' = m0 u + m2 v + m4, v' = m1 u + m3 v + m5 (KHR_texture_transform)
+    bool nearest = false;  ///< magnified texels stay squares
+    std::array<float, 6> map{1, 0, 0,
+                             1, 0, 0};  ///< u' = m0 u + m2 v + m4, v' = m1 u + m3 v + m5 (KHR_texture_transform)
 };
 
 /// glTF 2.0 metallic-roughness.
@@ -86,7 +87,7 @@ struct DrawNode {
 };
 
 struct Skin {
-    std::vector<uint32_t> joints;         ///< nodes
+    std::vector<uint32_t> joints;    ///< nodes
     std::vector<Matrix> from_model;  ///< inverse bind matrices
 };
 
@@ -122,6 +123,7 @@ struct Drawable {
 
 /// By the ending of the name, as read(). Any thread.
 Result<Drawable> read_drawable(const std::string& path);
+/// `folder`, with its slash, is where files beside this one are.
 Result<Drawable> parse_gltf_drawable(std::string_view bytes, const std::string& name, const std::string& folder);
 /// Of formats that hold only triangles: one grey surface, with edges where faces meet at more than 40 degrees.
 Drawable drawable_of(const Triangles& triangles, const std::string& name);

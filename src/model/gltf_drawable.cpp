@@ -34,8 +34,9 @@ public:
         out_.name = name_;
         for (const std::string& need : model_.extensionsRequired)
             if (std::find(std::begin(kKnownExtensions), std::end(kKnownExtensions), need) == std::end(kKnownExtensions))
-                return Error{formatted("{}: requires the extension {}, which is not drawn; export it without", name_, need),
-                             ErrorKind::Input};
+                return Error{
+                    formatted("{}: requires the extension {}, which is not drawn; export it without", name_, need),
+                    ErrorKind::Input};
         images();
         if (auto ok = surfaces(); !ok) return ok.error();
         if (auto ok = nodes(); !ok) return ok.error();
@@ -98,18 +99,21 @@ private:
     Result<TextureUse> texture(const Info& info, const std::string& what) {
         TextureUse use;
         if (info.index < 0) return use;
-        if (size_t(info.index) >= model_.textures.size()) return damaged(formatted("{} names texture {} of {}", what, info.index, model_.textures.size()));
+        if (size_t(info.index) >= model_.textures.size())
+            return damaged(formatted("{} names texture {} of {}", what, info.index, model_.textures.size()));
         const tinygltf::Texture& t = model_.textures[size_t(info.index)];
         if (t.source >= 0) {
             if (size_t(t.source) >= model_.images.size())
-                return damaged(formatted("textures[{}] names image {} of {}", info.index, t.source, model_.images.size()));
+                return damaged(
+                    formatted("textures[{}] names image {} of {}", info.index, t.source, model_.images.size()));
             if (out_.images[size_t(t.source)].width > 0) use.image = t.source;
         } else {
             note(formatted("textures[{}] of {}: has no image that is read; drawn as white", info.index, name_));
         }
         if (t.sampler >= 0) {
             if (size_t(t.sampler) >= model_.samplers.size())
-                return damaged(formatted("textures[{}] names sampler {} of {}", info.index, t.sampler, model_.samplers.size()));
+                return damaged(
+                    formatted("textures[{}] names sampler {} of {}", info.index, t.sampler, model_.samplers.size()));
             const tinygltf::Sampler& s = model_.samplers[size_t(t.sampler)];
             const auto wrap = [](int mode) {
                 if (mode == TINYGLTF_TEXTURE_WRAP_CLAMP_TO_EDGE) return Wrap::Clamp;
@@ -162,7 +166,8 @@ private:
                 return true;
             };
             const tinygltf::PbrMetallicRoughness& pbr = m.pbrMetallicRoughness;
-            bool good = number(pbr.metallicFactor, 0, 1, &s.metallic) && number(pbr.roughnessFactor, 0, 1, &s.roughness) &&
+            bool good = number(pbr.metallicFactor, 0, 1, &s.metallic) &&
+                        number(pbr.roughnessFactor, 0, 1, &s.roughness) &&
                         number(m.normalTexture.scale, -100, 100, &s.normal_scale) &&
                         number(m.occlusionTexture.strength, 0, 1, &s.occlusion_strength) &&
                         number(m.alphaCutoff, 0, 1e6, &s.alpha_cutoff);
@@ -172,7 +177,8 @@ private:
             }
             double strength = 1;
             if (const auto ext = m.extensions.find("KHR_materials_emissive_strength"); ext != m.extensions.end())
-                if (ext->second.Has("emissiveStrength")) strength = ext->second.Get("emissiveStrength").GetNumberAsDouble();
+                if (ext->second.Has("emissiveStrength"))
+                    strength = ext->second.Get("emissiveStrength").GetNumberAsDouble();
             if (m.emissiveFactor.size() == 3) {
                 float* to[] = {&s.emissive.x, &s.emissive.y, &s.emissive.z};
                 for (size_t c = 0; c < 3; ++c) good = good && number(m.emissiveFactor[c] * strength, 0, 1e6, to[c]);
@@ -180,8 +186,7 @@ private:
             if (!good) return damaged(what + " has a factor that is out of range or not a number");
             s.mask = m.alphaMode == "MASK";
             s.double_sided = m.doubleSided;
-            if (m.alphaMode == "BLEND")
-                note(formatted("{} of {}: its alpha blends; drawn opaque", what, name_));
+            if (m.alphaMode == "BLEND") note(formatted("{} of {}: its alpha blends; drawn opaque", what, name_));
             const auto take = [&](const auto& info, const char* which, TextureUse& to) {
                 auto use = texture(info, what + "." + which);
                 if (use) to = *use;
@@ -253,7 +258,8 @@ private:
                     v = float(word);
                 }
                 if (!(std::fabs(v) <= kFarthest))
-                    return Error{formatted("{}: {}: value {} is {}; numbers must be finite and at most 1000000", name_, what, i, v),
+                    return Error{formatted("{}: {}: value {} is {}; numbers must be finite and at most 1000000", name_,
+                                           what, i, v),
                                  ErrorKind::Input};
                 out.values[i * size_t(components) + c] = v;
             }
@@ -373,7 +379,8 @@ private:
         out.surface = p.material >= 0 ? uint32_t(p.material) : default_surface();
         std::vector<SkinWeights> weights;
         if (skinned) {
-            if (auto ok = skin_weights(attribute("JOINTS_0"), attribute("WEIGHTS_0"), count, what, weights); !ok) return ok;
+            if (auto ok = skin_weights(attribute("JOINTS_0"), attribute("WEIGHTS_0"), count, what, weights); !ok)
+                return ok;
         }
         // Weights follow the vertices that are made anew.
         const auto renumbered = [&](const auto& make) {
@@ -464,7 +471,8 @@ private:
                 return damaged(what + " is reached twice; it contains itself or has two parents");
             const tinygltf::Node& in = model_.nodes[size_t(v.node)];
             if (out_.nodes.size() >= kMostNodes)
-                return Error{formatted("{}: more than {} nodes; simplify the model", name_, kMostNodes), ErrorKind::Input};
+                return Error{formatted("{}: more than {} nodes; simplify the model", name_, kMostNodes),
+                             ErrorKind::Input};
             const auto number = int32_t(out_.nodes.size());
             number_[size_t(v.node)] = number;
             DrawNode node;
@@ -477,7 +485,8 @@ private:
                 node.has_matrix = true;
                 node.matrix = local;
             }
-            if (in.translation.size() == 3) std::copy(in.translation.begin(), in.translation.end(), node.translation.begin());
+            if (in.translation.size() == 3)
+                std::copy(in.translation.begin(), in.translation.end(), node.translation.begin());
             if (in.rotation.size() == 4) std::copy(in.rotation.begin(), in.rotation.end(), node.rotation.begin());
             if (in.scale.size() == 3) std::copy(in.scale.begin(), in.scale.end(), node.scale.begin());
             const Matrix place = times(v.place, local);
@@ -507,11 +516,13 @@ private:
             const auto first = uint32_t(out_.primitives.size());
             const tinygltf::Mesh& mesh = model_.meshes[size_t(number)];
             for (size_t p = 0; p < mesh.primitives.size(); ++p)
-                if (auto ok = primitive(mesh.primitives[p], formatted("meshes[{}].primitives[{}]", number, p), mirrored, skinned);
+                if (auto ok = primitive(mesh.primitives[p], formatted("meshes[{}].primitives[{}]", number, p), mirrored,
+                                        skinned);
                     !ok)
                     return ok;
             if (!mesh.weights.empty())
-                note(formatted("meshes[{}] of {}: morph targets are not drawn; it stays as it is modelled", number, name_));
+                note(formatted("meshes[{}] of {}: morph targets are not drawn; it stays as it is modelled", number,
+                               name_));
             known = meshes_.emplace(key, std::pair{first, uint32_t(out_.primitives.size()) - first}).first;
         }
         node.first_primitive = known->second.first;
@@ -548,7 +559,8 @@ private:
                 for (uint32_t v = 0; v < p.vertex_count; ++v)
                     for (const uint16_t j : out_.weights[p.first_weights + v].joints)
                         if (j >= joints)
-                            return damaged(formatted("vertex {} of a mesh names joint {} of {} (skins[{}])", v, j, joints, node.skin));
+                            return damaged(formatted("vertex {} of a mesh names joint {} of {} (skins[{}])", v, j,
+                                                     joints, node.skin));
             }
         }
         return {};
@@ -573,7 +585,8 @@ private:
                 } else if (channel.target_path == "scale") {
                     out.path = Channel::Path::Scale;
                 } else {
-                    note(formatted("{} of {}: the path \"{}\" is not known; left out", what, name_, channel.target_path));
+                    note(formatted("{} of {}: the path \"{}\" is not known; left out", what, name_,
+                                   channel.target_path));
                     continue;
                 }
                 if (channel.sampler < 0 || size_t(channel.sampler) >= in.samplers.size())
@@ -604,7 +617,8 @@ private:
         const float far = std::max({std::fabs(box.min.x), std::fabs(box.min.y), std::fabs(box.min.z),
                                     std::fabs(box.max.x), std::fabs(box.max.y), std::fabs(box.max.z)});
         if (!box.empty() && !(far <= kFarthest))
-            return Error{formatted("{}: its nodes put it {} m from its origin; at most 1000000", name_, far), ErrorKind::Input};
+            return Error{formatted("{}: its nodes put it {} m from its origin; at most 1000000", name_, far),
+                         ErrorKind::Input};
         return {};
     }
 
@@ -613,7 +627,7 @@ private:
     Drawable out_;
     std::set<std::string> noted_;
     uint32_t default_surface_ = UINT32_MAX;
-    std::vector<int32_t> number_;                         // of nodes, by glTF's
+    std::vector<int32_t> number_;                          // of nodes, by glTF's
     std::map<int, std::pair<uint32_t, uint32_t>> meshes_;  // primitives
 };
 

@@ -143,7 +143,8 @@ void make_tangents(std::vector<Vertex>& vertices, std::vector<uint32_t>& corners
             const vec3 n = vertices[v].normal;
             const vec3 flat = unit_or(along_u - n * dot(n, along_u), {});
             const vec3 here = vertices[c[k]].position;
-            sums[v] = sums[v] + flat * angle_at(here, vertices[c[(k + 1) % 3]].position, vertices[c[(k + 2) % 3]].position);
+            sums[v] =
+                sums[v] + flat * angle_at(here, vertices[c[(k + 1) % 3]].position, vertices[c[(k + 2) % 3]].position);
         }
     }
     for (size_t v = 0; v < vertices.size(); ++v) {

@@ -40,9 +40,32 @@ MeshVertex packed(const model::Vertex& v) {
             v.uv[1].y};
 }
 
-MeshNode packed(const model::BvhNode& n) { return {n.min.x, n.min.y, n.min.z, n.skip, n.max.x, n.max.y, n.max.z, n.leaf}; }
+MeshNode packed(const model::BvhNode& n) {
+    return {n.min.x, n.min.y, n.min.z, n.skip, n.max.x, n.max.y, n.max.z, n.leaf};
+}
 
 vec4 row(const Matrix& m, size_t r) { return {float(m[r]), float(m[4 + r]), float(m[8 + r]), float(m[12 + r])}; }
+
+// False where all of the box is outside one side of the picture, or behind the eye.
+bool may_be_seen(const Box3& box, dvec3 eye, const shade::CameraParams& camera) {
+    const auto dotted = [](const vec4& a, dvec3 b) {
+        return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
+    };
+    const double wide = dotted(camera.right, {camera.right.x, camera.right.y, camera.right.z}),
+                 high = dotted(camera.up, {camera.up.x, camera.up.y, camera.up.z});
+    bool outside[5] = {true, true, true, true, true};
+    for (int corner = 0; corner < 8; ++corner) {
+        const dvec3 p{double(corner & 1 ? box.max.x : box.min.x) - eye.x,
+                      double(corner & 2 ? box.max.y : box.min.y) - eye.y,
+                      double(corner & 4 ? box.max.z : box.min.z) - eye.z};
+        // Half a thousandth of the picture more than it shows.
+        const double ahead = dotted(camera.forward, p), edge = ahead + 5e-4 * std::fabs(ahead);
+        const double x = dotted(camera.right, p) / wide, y = dotted(camera.up, p) / high;
+        const bool out[5] = {x > edge, x<-edge, y> edge, y < -edge, ahead <= 0};
+        for (size_t i = 0; i < 5; ++i) outside[i] = outside[i] && out[i];
+    }
+    return std::none_of(std::begin(outside), std::end(outside), [](bool all) { return all; });
+}
 
 }  // namespace
 
@@ -158,14 +181,16 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     for (const auto& d : set.models) vertex_count += d->vertices.size(), corner_count += d->indices.size();
     const uint64_t most = runner_->device().limits().max_storage_binding;
     if (vertex_count * sizeof(MeshVertex) > most || corner_count * 4 > most)
-        return Error{formatted("the scene's meshes have {} vertices and {} triangles; this device holds at most {} bytes of either; simplify "
+        return Error{formatted("the scene's meshes have {} vertices and {} triangles; this device holds at most {} "
+                               "bytes of either; simplify "
                                "them",
                                vertex_count, corner_count / 3, most),
                      ErrorKind::Input};
     vertices.reserve(vertex_count);
     corners.reserve(corner_count);
     for (const auto& d : set.models) {
-        places_.push_back({uint32_t(vertices.size()), uint32_t(corners.size()), uint32_t(nodes.size()), uint32_t(surfaces.size())});
+        places_.push_back(
+            {uint32_t(vertices.size()), uint32_t(corners.size()), uint32_t(nodes.size()), uint32_t(surfaces.size())});
         for (const model::Vertex& v : d->vertices) vertices.push_back(packed(v));
         corners.insert(corners.end(), d->indices.begin(), d->indices.end());
         for (const model::BvhNode& n : d->bvh) nodes.push_back(packed(n));
@@ -186,7 +211,8 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     vertices.resize(vertices.size() + moved_vertices_);
     nodes.resize(nodes.size() + moved_nodes_);
     if (auto ok = bring_textures(set, surfaces); !ok) return ok;
-    const auto make = [&](rhi::BufferHandle& to, std::span<const std::byte> bytes, std::string_view label) -> Result<void> {
+    const auto make = [&](rhi::BufferHandle& to, std::span<const std::byte> bytes,
+                          std::string_view label) -> Result<void> {
         auto buffer = runner_->device().create_buffer({.size = bytes.size(), .label = label});
         if (!buffer) return buffer.error();
         to = *buffer;
@@ -200,11 +226,11 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     return {};
 }
 
-Result<void> GpuMeshes::update(const Frame& frame) {
+Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& camera) {
     parts_.clear();
     clusters_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
-    triangles_ = 0;
+    triangles_ = triangles_drawn_ = 0;
     if (frame.meshes.empty()) return {};
     const MeshSet set = make_mesh_set(frame);
     if (set.empty()) return {};
@@ -217,8 +243,7 @@ Result<void> GpuMeshes::update(const Frame& frame) {
         }
     }
     // The eye becomes the origin.
-    const Camera& camera = frame.camera;
-    const dvec3 eye{camera.position.x, camera.position.y, camera.position.z};
+    const dvec3 eye{frame.camera.position.x, frame.camera.position.y, frame.camera.position.z};
     std::vector<MeshNode> top;
     for (const model::BvhNode& n : set.tree) {
         MeshNode out = packed(n);
@@ -239,7 +264,8 @@ Result<void> GpuMeshes::update(const Frame& frame) {
                                           std::as_bytes(std::span(vertices)));
             !ok)
             return ok;
-        if (auto ok = device.write_buffer(nodes_, uint64_t{first_moved_node_} * sizeof(MeshNode), std::as_bytes(std::span(nodes)));
+        if (auto ok = device.write_buffer(nodes_, uint64_t{first_moved_node_} * sizeof(MeshNode),
+                                          std::as_bytes(std::span(nodes)));
             !ok)
             return ok;
     }
@@ -251,27 +277,21 @@ Result<void> GpuMeshes::update(const Frame& frame) {
         const Matrix back = model::inverse(place);
         const model::Surface& surface = set.drawable(part).surfaces[p.surface];
         const bool moved = part.first_moved != UINT32_MAX;
-        parts_.push_back({row(place, 0),
-                          row(place, 1),
-                          row(place, 2),
-                          row(before, 0),
-                          row(before, 1),
-                          row(before, 2),
-                          row(back, 0),
-                          row(back, 1),
-                          row(back, 2),
-                          at.first_surface + p.surface,
-                          (at.first_corner + p.first_index) / 3,
-                          moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
-                          moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node,
-                          p.node_count,
-                          (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u),
-                          p.index_count / 3,
-                          0});
+        parts_.push_back(
+            {row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2), row(back, 0),
+             row(back, 1), row(back, 2), at.first_surface + p.surface, (at.first_corner + p.first_index) / 3,
+             moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
+             moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
+             (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u), p.index_count / 3, 0});
         triangles_ += p.index_count / 3;
     }
+    std::vector<bool> in_sight;
+    for (const MeshSet::Part& part : set.parts) in_sight.push_back(may_be_seen(part.bounds, eye, camera));
+    for (size_t i = 0; i < parts_.size(); ++i)
+        if (in_sight[i]) triangles_drawn_ += parts_[i].triangle_count;
     const auto list = [&](uint32_t& count, bool holes, bool both) {
         for (uint32_t i = 0; i < parts_.size(); ++i) {
+            if (!in_sight[i]) continue;
             const bool masked = (parts_[i].flags & kMeshMask) != 0, two = (parts_[i].flags & kMeshDoubleSided) != 0;
             if (masked != holes || (!holes && two != both)) continue;
             for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++count) clusters_.push_back({i, t});
@@ -286,7 +306,9 @@ Result<void> GpuMeshes::update(const Frame& frame) {
 MeshHandles GpuMeshes::import(Graph& g) const {
     MeshHandles out;
     if (empty()) return out;
-    out.clusters = g.upload("mesh clusters", std::span(clusters_));
+    // Buffers have a size: where nothing is in sight, one cluster that is not drawn.
+    const MeshClusterRef none{};
+    out.clusters = g.upload("mesh clusters", clusters_.empty() ? std::span(&none, 1) : std::span(clusters_));
     out.parts = g.upload("mesh parts", std::span(parts_));
     out.corners = g.import("mesh corners", corners_);
     out.vertices = g.import("mesh vertices", vertices_);

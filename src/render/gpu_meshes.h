@@ -4,6 +4,7 @@
 #pragma once
 
 #include "render/graph_runner.h"
+#include "render/lib/camera.gpu.h"
 #include "render/mesh_set.h"
 
 #include <array>
@@ -20,7 +21,6 @@ struct MeshHandles {
     Buffer nodes;  // MeshNode: the parts' tree, then each part's
     std::array<Image, 2 * kMeshPages> pages;
     uint32_t one_sided = 0, double_sided = 0, masked = 0;  // clusters
-    explicit operator bool() const { return one_sided + double_sided + masked > 0; }
 };
 
 class GpuMeshes {
@@ -30,11 +30,13 @@ public:
     GpuMeshes(const GpuMeshes&) = delete;
     GpuMeshes& operator=(const GpuMeshes&) = delete;
 
-    // Fails where the device has no room; a set that is larger than buffers may be is one error of kind Input.
-    Result<void> update(const Frame& frame);
+    // Fails where the device has no room; a set that is larger than buffers may be is one error of kind Input. Parts that the camera cannot see
+    // are not drawn, though they shadow.
+    Result<void> update(const Frame& frame, const shade::CameraParams& camera);
     MeshHandles import(Graph& g) const;
-    bool empty() const { return clusters_.empty(); }
+    bool empty() const { return parts_.empty(); }
     uint64_t triangles() const { return triangles_; }
+    uint64_t triangles_drawn() const { return triangles_drawn_; }
 
 private:
     struct Model {
@@ -55,7 +57,7 @@ private:
     std::vector<MeshPart> parts_;
     std::vector<MeshClusterRef> clusters_;
     uint32_t one_sided_ = 0, double_sided_ = 0, masked_ = 0;
-    uint64_t triangles_ = 0;
+    uint64_t triangles_ = 0, triangles_drawn_ = 0;
 };
 
 }  // namespace kiln::render

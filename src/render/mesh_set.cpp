@@ -17,9 +17,9 @@ Box3 box_of(const Box3& local, const Matrix& place) {
     Box3 out;
     if (local.empty()) return out;
     for (int corner = 0; corner < 8; ++corner) {
-        const dvec3 q =
-            model::transform_point(place, {double(corner & 1 ? local.max.x : local.min.x), double(corner & 2 ? local.max.y : local.min.y),
-                                           double(corner & 4 ? local.max.z : local.min.z)});
+        const dvec3 q = model::transform_point(
+            place, {double(corner & 1 ? local.max.x : local.min.x), double(corner & 2 ? local.max.y : local.min.y),
+                    double(corner & 4 ? local.max.z : local.min.z)});
         const vec3 at{float(q.x), float(q.y), float(q.z)};
         out = box_union(out, {at, at});
     }
@@ -56,11 +56,13 @@ void skin(MeshSet& set, MeshSet::Part& part, const Drawable& d, const Primitive&
         set.moved.push_back(v);
     }
     part.first_node = uint32_t(set.moved_nodes.size());
-    set.moved_nodes.insert(set.moved_nodes.end(), d.bvh.begin() + p.first_node, d.bvh.begin() + p.first_node + p.node_count);
+    set.moved_nodes.insert(set.moved_nodes.end(), d.bvh.begin() + p.first_node,
+                           d.bvh.begin() + p.first_node + p.node_count);
     std::vector<Box3> boxes(p.index_count / 3);
     for (size_t t = 0; t < boxes.size(); ++t)
         for (size_t c = 0; c < 3; ++c) {
-            const vec3 at = set.moved[part.first_moved + d.indices[p.first_index + 3 * t + c] - p.first_vertex].position;
+            const vec3 at =
+                set.moved[part.first_moved + d.indices[p.first_index + 3 * t + c] - p.first_vertex].position;
             boxes[t] = box_union(boxes[t], {at, at});
         }
     const std::span<BvhNode> nodes = std::span(set.moved_nodes).subspan(part.first_node);

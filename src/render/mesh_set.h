@@ -15,9 +15,9 @@ namespace kiln::render {
 
 struct MeshSet {
     struct Part {
-        uint32_t model = 0;      // of `models`
-        uint32_t primitive = 0;  // of that model
-        uint32_t mesh = 0;       // of Frame::meshes
+        uint32_t model = 0;               // of `models`
+        uint32_t primitive = 0;           // of that model
+        uint32_t mesh = 0;                // of Frame::meshes
         model::Matrix place{}, before{};  // world from local
         Box3 bounds;                      // world, grown by rounding
         // Of a skinned part: its vertices are `moved` from here on, in world metres, and its boxes `nodes`.

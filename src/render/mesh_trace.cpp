@@ -50,7 +50,8 @@ bool meets(const BvhNode& node, dvec3 o, dvec3 d, double t_last) {
 // Bilinear, in linear light.
 vec4 texel(const model::Drawable& d, const TextureUse& use, vec2 uv, bool srgb) {
     const model::Image& image = d.images[size_t(use.image)];
-    const float u = use.map[0] * uv.x + use.map[2] * uv.y + use.map[4], v = use.map[1] * uv.x + use.map[3] * uv.y + use.map[5];
+    const float u = use.map[0] * uv.x + use.map[2] * uv.y + use.map[4],
+                v = use.map[1] * uv.x + use.map[3] * uv.y + use.map[5];
     const auto wrapped = [](int i, int n, model::Wrap wrap) {
         if (wrap == model::Wrap::Clamp) return std::clamp(i, 0, n - 1);
         const int m = ((i % (2 * n)) + 2 * n) % (2 * n);
@@ -63,7 +64,8 @@ vec4 texel(const model::Drawable& d, const TextureUse& use, vec2 uv, bool srgb) 
     const float fx = use.nearest ? 0 : x - std::floor(x), fy = use.nearest ? 0 : y - std::floor(y);
     float sum[4] = {};
     for (int k = 0; k < 4; ++k) {
-        const int i = wrapped(x0 + (k & 1), image.width, use.wrap_u), j = wrapped(y0 + (k >> 1), image.height, use.wrap_v);
+        const int i = wrapped(x0 + (k & 1), image.width, use.wrap_u),
+                  j = wrapped(y0 + (k >> 1), image.height, use.wrap_v);
         const float weight = ((k & 1) ? fx : 1 - fx) * ((k >> 1) ? fy : 1 - fy);
         const uint8_t* p = &image.rgba[(size_t(j) * size_t(image.width) + size_t(i)) * 4];
         for (size_t c = 0; c < 4; ++c) {
@@ -103,7 +105,8 @@ bool MeshTrace::walk(dvec3 origin, dvec3 direction, double t_last, bool seen_onl
             const model::Surface& surface = d.surfaces[p.surface];
             const BvhNode* nodes = set_.nodes(part);
             const Vertex* vertices = set_.vertices(part);
-            const dvec3 o = model::transform_point(back_[which], origin), v = model::transform_vector(back_[which], direction);
+            const dvec3 o = model::transform_point(back_[which], origin),
+                        v = model::transform_vector(back_[which], direction);
             for (uint32_t j = 0; j < p.node_count;) {
                 const BvhNode& node = nodes[j];
                 if (!meets(node, o, v, found.t)) {
@@ -131,9 +134,11 @@ bool MeshTrace::walk(dvec3 origin, dvec3 direction, double t_last, bool seen_onl
                     if (seen_only && !surface.double_sided && side > 0) continue;
                     if (surface.mask) {
                         double alpha = double(surface.base_color.w) *
-                                       (w.x * double(corner[0]->color.w) + w.y * double(corner[1]->color.w) + w.z * double(corner[2]->color.w));
+                                       (w.x * double(corner[0]->color.w) + w.y * double(corner[1]->color.w) +
+                                        w.z * double(corner[2]->color.w));
                         if (surface.base_texture.image >= 0)
-                            alpha *= double(texel(d, surface.base_texture, uv_at(corner, w, surface.base_texture), true).w);
+                            alpha *=
+                                double(texel(d, surface.base_texture, uv_at(corner, w, surface.base_texture), true).w);
                         if (alpha < double(surface.alpha_cutoff)) continue;
                     }
                     found = {which, triangle, t, w};
@@ -182,13 +187,14 @@ MeshHit MeshTrace::look(dvec3 origin, dvec3 direction, const Found& found) const
         const dvec3 b_local = crossed(n_local, t_local);
         const double hand = v[0]->tangent.w < 0 ? -1 : 1;
         const dvec3 tangent = unit_or(model::transform_vector(part.place, t_local), {});
-        const dvec3 bitangent = unit_or(
-            model::transform_vector(part.place, {b_local.x * hand, b_local.y * hand, b_local.z * hand}), {});
+        const dvec3 bitangent =
+            unit_or(model::transform_vector(part.place, {b_local.x * hand, b_local.y * hand, b_local.z * hand}), {});
         const vec4 bump = texel(d, s.normal_texture, uv_at(v, w, s.normal_texture), false);
-        n = unit_or(plus(plus({n.x * double(2 * bump.z - 1), n.y * double(2 * bump.z - 1), n.z * double(2 * bump.z - 1)}, tangent,
-                              double((2 * bump.x - 1) * s.normal_scale)),
-                         bitangent, double((2 * bump.y - 1) * s.normal_scale)),
-                    n);
+        n = unit_or(
+            plus(plus({n.x * double(2 * bump.z - 1), n.y * double(2 * bump.z - 1), n.z * double(2 * bump.z - 1)},
+                      tangent, double((2 * bump.x - 1) * s.normal_scale)),
+                 bitangent, double((2 * bump.y - 1) * s.normal_scale)),
+            n);
     }
     out.normal = {n.x * side, n.y * side, n.z * side};
     out.face = {out.face.x * side, out.face.y * side, out.face.z * side};
@@ -219,7 +225,8 @@ MeshHit MeshTrace::look(dvec3 origin, dvec3 direction, const Found& found) const
         m.emissive = {m.emissive.x * t.x, m.emissive.y * t.y, m.emissive.z * t.z};
     }
     if (s.occlusion_texture.image >= 0)
-        out.ambient = 1 + s.occlusion_strength * (texel(d, s.occlusion_texture, uv_at(v, w, s.occlusion_texture), false).x - 1);
+        out.ambient =
+            1 + s.occlusion_strength * (texel(d, s.occlusion_texture, uv_at(v, w, s.occlusion_texture), false).x - 1);
     return out;
 }
 

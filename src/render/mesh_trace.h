@@ -14,7 +14,8 @@ struct MeshHit {
     double t = 0;
     dvec3 normal;  // unit, towards the ray's origin: of the shading
     dvec3 face;    // of the triangle itself, likewise
-    dvec3 round;   // where rays start: the point moved onto the round surface that the normals tell of, see mesh_shadow.comp
+    dvec3
+        round;  // where rays start: the point moved onto the round surface that the normals tell of, see mesh_shadow.comp
     Material material;
     float ambient = 1;
 };

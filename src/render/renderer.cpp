@@ -257,7 +257,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         return updated.error();
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
-    if (auto brought = meshes->update(frame); !brought) return brought.error();
+    if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
     const TileInputs switches = inputs(frame, settings);
     if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
         !warm)
@@ -308,7 +308,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
-    stats.triangles = stats.triangles_drawn = meshes->triangles();
+    stats.triangles = meshes->triangles();
+    stats.triangles_drawn = meshes->triangles_drawn();
     if (runner->pipelines().made_late() != late)
         log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
     if (auto ok = healthy(); !ok) return ok.error();

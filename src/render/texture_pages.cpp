@@ -45,7 +45,9 @@ std::vector<Extent> assign_pages(std::span<PagedTexture> textures) {
                      std::min(std::bit_ceil(uint32_t(textures[i].height)), rhi::kMaxTexture2d), 1};
             if (std::find(sizes.begin(), sizes.end(), of[i]) == sizes.end()) sizes.push_back(of[i]);
         }
-        const auto smaller = [](Extent a, Extent b) { return area(a) != area(b) ? area(a) < area(b) : a.width < b.width; };
+        const auto smaller = [](Extent a, Extent b) {
+            return area(a) != area(b) ? area(a) < area(b) : a.width < b.width;
+        };
         std::sort(sizes.begin(), sizes.end(), smaller);
         while (sizes.size() > kMeshPages) {
             // The smallest goes to the next that holds it, or grows to where one does.
@@ -90,7 +92,8 @@ std::vector<uint8_t> resized(const PagedTexture& t, Extent size) {
             for (size_t c = 0; c < 4; ++c) {
                 const bool srgb = t.srgb && c < 3;
                 const auto at = [&](size_t i, size_t j) { return from_byte(t.rgba[(j * width + i) * 4 + c], srgb); };
-                const float low = at(x0, y0) * (1 - fx) + at(x1, y0) * fx, high = at(x0, y1) * (1 - fx) + at(x1, y1) * fx;
+                const float low = at(x0, y0) * (1 - fx) + at(x1, y0) * fx,
+                            high = at(x0, y1) * (1 - fx) + at(x1, y1) * fx;
                 out[(y * size.width + x) * 4 + c] = to_byte(low * (1 - fy) + high * fy, srgb);
             }
         }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "scene/scene_meshes.h"
 
-#include "base/format.h"
+#include "scene/bundled.h"
 
 #include <map>
 
@@ -33,7 +33,12 @@ SceneMeshes load_meshes(const SceneData& scene) {
         auto known = files.find(mesh.file);
         if (known == files.end()) {
             const std::string path = mesh.file.starts_with('/') ? mesh.file : scene.folder + mesh.file;
-            auto read = model::read_drawable(path);
+            const auto bundled =
+                scene.folder.empty() ? bundled_model(scene.source.name(), mesh.file) : std::span<const unsigned char>{};
+            auto read = bundled.empty()
+                            ? model::read_drawable(path)
+                            : model::parse_gltf_drawable(
+                                  {reinterpret_cast<const char*>(bundled.data()), bundled.size()}, mesh.file, "");
             if (read) {
                 out.notes.insert(out.notes.end(), read->notes.begin(), read->notes.end());
                 known = files.emplace(mesh.file, std::make_shared<const model::Drawable>(std::move(*read))).first;
@@ -47,7 +52,8 @@ SceneMeshes load_meshes(const SceneData& scene) {
             out.models.emplace_back();
             continue;
         }
-        const auto material = mesh.material.empty() ? scene.material_numbers.end() : scene.material_numbers.find(mesh.material);
+        const auto material =
+            mesh.material.empty() ? scene.material_numbers.end() : scene.material_numbers.find(mesh.material);
         out.models.push_back(material == scene.material_numbers.end()
                                  ? *known->second
                                  : painted(**known->second, scene.materials[material->second].second));
@@ -69,9 +75,9 @@ Box3 SceneMeshes::bounds(const SceneData& scene) const {
         const Box3 b = model::bounds_of(*mesh.model);
         const model::Matrix place = model::matrix_of(mesh.transform);
         for (int corner = 0; corner < 8 && !b.empty(); ++corner) {
-            const dvec3 q =
-                model::transform_point(place, {double(corner & 1 ? b.max.x : b.min.x), double(corner & 2 ? b.max.y : b.min.y),
-                                               double(corner & 4 ? b.max.z : b.min.z)});
+            const dvec3 q = model::transform_point(
+                place, {double(corner & 1 ? b.max.x : b.min.x), double(corner & 2 ? b.max.y : b.min.y),
+                        double(corner & 4 ? b.max.z : b.min.z)});
             const vec3 at{float(q.x), float(q.y), float(q.z)};
             out = box_union(out, {at, at});
         }

@@ -40,9 +40,11 @@ TEST(Drawable, FactorsTexturesAndModesAreAsTheFileHasThem) {
     SquareGlb g;
     g.material = ",\"material\":0";
     g.materials =
-        "{\"name\":\"brass\",\"doubleSided\":true,\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25,\"emissiveFactor\":[1,0.5,0],"
+        "{\"name\":\"brass\",\"doubleSided\":true,\"alphaMode\":\"MASK\",\"alphaCutoff\":0.25,\"emissiveFactor\":[1,0."
+        "5,0],"
         "\"extensions\":{\"KHR_materials_emissive_strength\":{\"emissiveStrength\":4}},"
-        "\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.1,0.2,0.3,0.4],\"metallicFactor\":0.6,\"roughnessFactor\":0.7}}";
+        "\"pbrMetallicRoughness\":{\"baseColorFactor\":[0.1,0.2,0.3,0.4],\"metallicFactor\":0.6,\"roughnessFactor\":0."
+        "7}}";
     const Drawable d = good(g.whole());
     ASSERT_EQ(d.surfaces.size(), 1u);
     const Surface& s = d.surfaces[0];
@@ -58,8 +60,9 @@ TEST(Drawable, FactorsTexturesAndModesAreAsTheFileHasThem) {
 
 TEST(Drawable, NodesPlaceWhatTheyHoldAndMirrorsTurnTriangles) {
     SquareGlb g;
-    g.nodes = "{\"translation\":[1,2,3],\"scale\":[2,2,2],\"children\":[1]},{\"mesh\":0,\"scale\":[-1,1,1],\"rotation\":[0,0,"
-              "0.70710678,0.70710678]}";
+    g.nodes =
+        "{\"translation\":[1,2,3],\"scale\":[2,2,2],\"children\":[1]},{\"mesh\":0,\"scale\":[-1,1,1],\"rotation\":[0,0,"
+        "0.70710678,0.70710678]}";
     const Drawable d = good(g.whole());
     const std::vector<Matrix> places = pose(d, 0);
     ASSERT_EQ(places.size(), 2u);
@@ -123,7 +126,8 @@ TEST(Drawable, EdgesSharperThanTheAngleStaySharp) {
     const Drawable d = drawable_of(cube, "cube");
     EXPECT_EQ(d.vertices.size(), 24u);  // a normal a face at every corner
     for (size_t t = 0; t < d.indices.size(); t += 3) {
-        const Vertex &a = d.vertices[d.indices[t]], &b = d.vertices[d.indices[t + 1]], &c = d.vertices[d.indices[t + 2]];
+        const Vertex &a = d.vertices[d.indices[t]], &b = d.vertices[d.indices[t + 1]],
+                     &c = d.vertices[d.indices[t + 2]];
         const vec3 n = normalize(cross(b.position - a.position, c.position - a.position));
         for (const Vertex* v : {&a, &b, &c}) expect_near(v->normal, n, 1e-5f);
     }
@@ -135,9 +139,11 @@ TEST(Drawable, AnimationsGiveTheFormulasValues) {
     const int moves = g.floats({0, 0, 0, 2, 0, 0, 2, 4, 0}, "VEC3", 3);
     const float h = std::sqrt(0.5f);
     const int turns = g.floats({0, 0, 0, 1, 0, 0, h, h, 0, 0, h, h}, "VEC4", 4);
-    g.rest = ",\"animations\":[{\"samplers\":[{\"input\":" + std::to_string(times) + ",\"output\":" + std::to_string(moves) +
-             "},{\"input\":" + std::to_string(times) + ",\"output\":" + std::to_string(turns) +
-             "}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"translation\"}},{\"sampler\":1,\"target\":{\"node\":"
+    g.rest = ",\"animations\":[{\"samplers\":[{\"input\":" + std::to_string(times) +
+             ",\"output\":" + std::to_string(moves) + "},{\"input\":" + std::to_string(times) +
+             ",\"output\":" + std::to_string(turns) +
+             "}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":0,\"path\":\"translation\"}},{\"sampler\":1,"
+             "\"target\":{\"node\":"
              "0,\"path\":\"rotation\"}}]}]";
     const Drawable d = good(g.whole());
     EXPECT_EQ(d.duration, 3);
@@ -177,7 +183,8 @@ TEST(Bvh, WalkingItMeetsEveryBoxThatHoldsThePoint) {
                         continue;
                     }
                     for (uint32_t k = 0; k < (nodes[i].leaf & 7u); ++k)
-                        if (ordered[(nodes[i].leaf >> 3) + k].contains(p)) found.push_back(order[(nodes[i].leaf >> 3) + k]);
+                        if (ordered[(nodes[i].leaf >> 3) + k].contains(p))
+                            found.push_back(order[(nodes[i].leaf >> 3) + k]);
                     ++i;
                 }
                 for (uint32_t i = 0; i < count; ++i)
@@ -202,8 +209,10 @@ TEST(Drawable, EveryBrokenReferenceIsOneErrorThatNamesTheElement) {
     EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":3}"; }), HasSubstr("mesh 3 of 1"));
     EXPECT_THAT(with([](SquareGlb& g) { g.material = ",\"material\":2"; }),
                 HasSubstr("meshes[0].primitives[0] names material 2 of 0"));
-    EXPECT_THAT(with([](SquareGlb& g) { g.attributes = "\"POSITION\":0,\"NORMAL\":9"; }), HasSubstr("NORMAL names accessor 9 of 2"));
-    EXPECT_THAT(with([](SquareGlb& g) { g.attributes = "\"POSITION\":1"; }), HasSubstr("POSITION: accessors[1] holds another type"));
+    EXPECT_THAT(with([](SquareGlb& g) { g.attributes = "\"POSITION\":0,\"NORMAL\":9"; }),
+                HasSubstr("NORMAL names accessor 9 of 2"));
+    EXPECT_THAT(with([](SquareGlb& g) { g.attributes = "\"POSITION\":1"; }),
+                HasSubstr("POSITION: accessors[1] holds another type"));
     EXPECT_THAT(with([](SquareGlb& g) {
                     g.attributes += ",\"TEXCOORD_0\":" + std::to_string(g.floats({0, 0}, "VEC2", 2));
                 }),
@@ -218,10 +227,12 @@ TEST(Drawable, EveryBrokenReferenceIsOneErrorThatNamesTheElement) {
                     std::memcpy(g.bin.data() + 4, &nan, 4);
                 }),
                 HasSubstr("meshes[0].primitives[0].POSITION: value 0 is nan"));
-    EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":0,\"translation\":[0,1e9,0]}"; }), HasSubstr("from its origin"));
+    EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":0,\"translation\":[0,1e9,0]}"; }),
+                HasSubstr("from its origin"));
     EXPECT_THAT(with([](SquareGlb& g) { g.rest = ",\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]"; }),
                 HasSubstr("requires the extension KHR_draco_mesh_compression"));
-    EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":0,\"skin\":4}"; }), HasSubstr("nodes[0] names skin 4 of 0"));
+    EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":0,\"skin\":4}"; }),
+                HasSubstr("nodes[0] names skin 4 of 0"));
     EXPECT_THAT(with([](SquareGlb& g) {
                     g.material = ",\"material\":0";
                     g.materials = "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":5}}}";
@@ -235,7 +246,8 @@ TEST(Drawable, AnImageOfAnotherKindIsANoteAndTheRestIsDrawn) {
     const int view = g.add_bytes(std::as_bytes(std::span(jpeg)));
     g.material = ",\"material\":0";
     g.materials = "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}";
-    g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/jpeg\",\"bufferView\":" + std::to_string(view) + "}]";
+    g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/jpeg\",\"bufferView\":" +
+             std::to_string(view) + "}]";
     const Drawable d = good(g.whole());
     ASSERT_EQ(d.notes.size(), 1u);
     EXPECT_THAT(d.notes[0], HasSubstr("images[0] of m.glb: is not a PNG image but image/jpeg"));
@@ -250,12 +262,14 @@ TEST(Drawable, AnyBytesAreADrawableOrAnError) {
     const std::vector<uint16_t> joints(16, 0);
     const int j = g.add(std::span(joints), 5123, "VEC4", 4);
     const int w = g.floats(std::vector<float>(16, 0.25f), "VEC4", 4);
-    g.attributes += ",\"TEXCOORD_0\":" + std::to_string(uv) + ",\"JOINTS_0\":" + std::to_string(j) + ",\"WEIGHTS_0\":" + std::to_string(w);
+    g.attributes += ",\"TEXCOORD_0\":" + std::to_string(uv) + ",\"JOINTS_0\":" + std::to_string(j) +
+                    ",\"WEIGHTS_0\":" + std::to_string(w);
     g.material = ",\"material\":0";
     g.materials = "{\"alphaMode\":\"MASK\",\"pbrMetallicRoughness\":{\"metallicFactor\":0.5}}";
     g.nodes = "{\"mesh\":0,\"skin\":0,\"children\":[1]},{\"translation\":[0,0,1]}";
-    g.rest = ",\"skins\":[{\"joints\":[1]}],\"animations\":[{\"samplers\":[{\"input\":" + std::to_string(times) + ",\"output\":" +
-             std::to_string(moves) + "}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":1,\"path\":\"translation\"}}]}]";
+    g.rest = ",\"skins\":[{\"joints\":[1]}],\"animations\":[{\"samplers\":[{\"input\":" + std::to_string(times) +
+             ",\"output\":" + std::to_string(moves) +
+             "}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":1,\"path\":\"translation\"}}]}]";
     const std::string seed = g.whole();
     ASSERT_EQ(good(seed).weights.size(), 6u);
     std::mt19937 random(3);

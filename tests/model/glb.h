@@ -18,8 +18,9 @@ public:
             const std::string& extra = {}) {
         const int view = add_bytes(std::as_bytes(values));
         accessors += (accessors.empty() ? "" : ",") + std::string("{\"bufferView\":") + std::to_string(view) +
-                     ",\"componentType\":" + std::to_string(component_type) + ",\"count\":" +
-                     std::to_string(values.size() / per_element) + ",\"type\":\"" + type + "\"" + extra + "}";
+                     ",\"componentType\":" + std::to_string(component_type) +
+                     ",\"count\":" + std::to_string(values.size() / per_element) + ",\"type\":\"" + type + "\"" +
+                     extra + "}";
         return accessor_count++;
     }
     int floats(const std::vector<float>& v, const std::string& type, size_t per_element) {
@@ -27,16 +28,17 @@ public:
     }
     int indices(const std::vector<uint16_t>& v) { return add(std::span(v), 5123, "SCALAR", 1); }
     int add_bytes(std::span<const std::byte> bytes) {
-        views += (views.empty() ? "" : ",") + std::string("{\"buffer\":0,\"byteOffset\":") + std::to_string(bin.size()) +
-                 ",\"byteLength\":" + std::to_string(bytes.size()) + "}";
+        views += (views.empty() ? "" : ",") + std::string("{\"buffer\":0,\"byteOffset\":") +
+                 std::to_string(bin.size()) + ",\"byteLength\":" + std::to_string(bytes.size()) + "}";
         bin.append(reinterpret_cast<const char*>(bytes.data()), bytes.size());
         while (bin.size() % 4) bin += '\0';
         return view_count++;
     }
     // `members`: the rest of the JSON, "\"nodes\": [...], ..." .
     std::string file(const std::string& members) const {
-        std::string json = "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":" + std::to_string(bin.size()) +
-                           "}],\"bufferViews\":[" + views + "],\"accessors\":[" + accessors + "]," + members + "}";
+        std::string json =
+            "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":" + std::to_string(bin.size()) +
+            "}],\"bufferViews\":[" + views + "],\"accessors\":[" + accessors + "]," + members + "}";
         while (json.size() % 4) json += ' ';
         std::string out = "glTF";
         word(out, 2);

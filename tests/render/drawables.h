@@ -14,8 +14,9 @@
 
 namespace kiln::render::meshes {
 
-inline std::shared_ptr<const model::Drawable> of_surface(std::vector<model::Vertex> vertices, std::vector<uint32_t> corners,
-                                                         model::Surface surface, std::vector<model::Image> images = {}) {
+inline std::shared_ptr<const model::Drawable> of_surface(std::vector<model::Vertex> vertices,
+                                                         std::vector<uint32_t> corners, model::Surface surface,
+                                                         std::vector<model::Image> images = {}) {
     auto d = std::make_shared<model::Drawable>();
     model::Primitive p;
     p.index_count = uint32_t(corners.size());
@@ -53,7 +54,8 @@ inline std::shared_ptr<const model::Drawable> sphere(float radius, int around, m
         for (int i = 0; i <= around; ++i) {
             const double polar = std::numbers::pi * j / rings, turn = 2 * std::numbers::pi * i / around;
             model::Vertex q;
-            q.normal = {float(std::sin(polar) * std::cos(turn)), float(std::cos(polar)), float(-std::sin(polar) * std::sin(turn))};
+            q.normal = {float(std::sin(polar) * std::cos(turn)), float(std::cos(polar)),
+                        float(-std::sin(polar) * std::sin(turn))};
             q.position = q.normal * radius;
             q.uv[0] = {float(i) / float(around), float(j) / float(rings)};
             v.push_back(q);

@@ -78,7 +78,8 @@ TEST_F(MeshGpu, AMeshSphereIsTheFieldsSphere) {
         const double apart = std::fabs(double(a.depth[i]) - double(b.depth[i])) / double(a.depth[i]);
         const vec3 d = shade::camera_direction_at(eye, float(i % 160) + 0.5f, float(i / 160) + 0.5f);
         const float* n = &a.rgba[4 * i];
-        const double facing = -2 * (double(d.x) * (double(n[0]) - 0.5) + double(d.y) * (double(n[1]) - 0.5) + double(d.z) * (double(n[2]) - 0.5));
+        const double facing = -2 * (double(d.x) * (double(n[0]) - 0.5) + double(d.y) * (double(n[1]) - 0.5) +
+                                    double(d.z) * (double(n[2]) - 0.5));
         far = std::max(far, apart * std::min(1.0, facing / 0.15));
         turned = std::max(turned, angle_deg(&a.rgba[4 * i], &b.rgba[4 * i]));
     }
@@ -117,7 +118,8 @@ TEST_F(MeshGpu, MeshAndFieldCutEachOtherOnTheTrueCurve) {
             int owner = -1;
             bool sure = true;
             for (int k = 0; k < 9; ++k) {
-                const vec3 f = shade::camera_direction_at(eye, float(x) + 0.5f * float(k % 3), float(y) + 0.5f * float(k / 3));
+                const vec3 f =
+                    shade::camera_direction_at(eye, float(x) + 0.5f * float(k % 3), float(y) + 0.5f * float(k / 3));
                 const double size = std::sqrt(double(f.x) * f.x + double(f.y) * f.y + double(f.z) * f.z);
                 const dvec3 d{f.x / size, f.y / size, f.z / size};
                 const double a = sphere_hit(o, d, c_field, r_field), b = sphere_hit(o, d, c_mesh, r_mesh);
@@ -156,10 +158,14 @@ TEST_F(MeshGpu, SoftShadowsAreTheVisibleShareOfTheDisc) {
         open.camera.target = {0, 0, 0.01f};
         open.camera.fov_y_deg = 80;
         open.environment = Environment{.color = {0, 0, 0}};
-        open.lights = {{.kind = Light::Kind::Directional, .direction = {0, -1, 0}, .angular_diameter_deg = diameter_deg}};
-        if (floor_is_mesh) open.meshes.push_back(meshes::at(meshes::sheet(-1.2f, -1.2f, 1.2f, 1.2f, meshes::matte({0.5f, 0.5f, 0.5f}))));
+        open.lights = {
+            {.kind = Light::Kind::Directional, .direction = {0, -1, 0}, .angular_diameter_deg = diameter_deg}};
+        if (floor_is_mesh)
+            open.meshes.push_back(
+                meshes::at(meshes::sheet(-1.2f, -1.2f, 1.2f, 1.2f, meshes::matte({0.5f, 0.5f, 0.5f}))));
         Frame shaded = open;
-        shaded.meshes.push_back(meshes::at(meshes::sheet(-40, -20, 0, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {0, height, 0}));
+        shaded.meshes.push_back(
+            meshes::at(meshes::sheet(-40, -20, 0, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {0, height, 0}));
         const Picture a = picture(open), b = picture(shaded);
         const shade::CameraParams eye = shade::camera_params(open.camera, a.width, a.height);
         double worst = 0;
@@ -186,11 +192,12 @@ TEST_F(MeshGpu, PicturesAreThoseOfTheJudge) {
     w.edits.push_back(field::worlds::edit(Box{.half_extents = {1.3f, 0.1f, 1.3f}}, {0, -0.8f, 0}));
     Frame frame = frame_with(w);
     frame.meshes.push_back(meshes::at(meshes::sphere(0.4f, 24, meshes::of_material(kClay)), {0.75f, -0.2f, 0.4f}));
-    frame.meshes.push_back(meshes::at(meshes::sheet(-0.6f, -0.6f, 0.6f, 0.6f, meshes::matte({0.2f, 0.5f, 0.3f})), {-0.7f, -0.6f, 0.3f},
-                                      axis_angle({0, 0, 1}, 0.2f)));
-    frame.lights = {{.kind = Light::Kind::Directional, .direction = {-0.5f, -1, -0.4f}, .angular_diameter_deg = 4},
-                    {.kind = Light::Kind::Point, .position = {1.5f, 1.2f, 1}, .intensity = 4, .radius = 0.1f},
-                    {.kind = Light::Kind::Spot, .direction = {0.5f, -1, -0.2f}, .position = {-1, 1.2f, 0.8f}, .intensity = 6}};
+    frame.meshes.push_back(meshes::at(meshes::sheet(-0.6f, -0.6f, 0.6f, 0.6f, meshes::matte({0.2f, 0.5f, 0.3f})),
+                                      {-0.7f, -0.6f, 0.3f}, axis_angle({0, 0, 1}, 0.2f)));
+    frame.lights = {
+        {.kind = Light::Kind::Directional, .direction = {-0.5f, -1, -0.4f}, .angular_diameter_deg = 4},
+        {.kind = Light::Kind::Point, .position = {1.5f, 1.2f, 1}, .intensity = 4, .radius = 0.1f},
+        {.kind = Light::Kind::Spot, .direction = {0.5f, -1, -0.2f}, .position = {-1, 1.2f, 0.8f}, .intensity = 6}};
     const MeshSet set = make_mesh_set(frame);
     const MeshTrace trace(set);
     const auto program = frame.field->program();
@@ -283,12 +290,53 @@ TEST_F(MeshGpu, HolesOfAMaskShowWhatIsBehindAndLetLightThrough) {
     const Picture holes = picture(frame);
     frame.meshes.push_back(meshes::at(meshes::sheet(-1, -1, 1, 1, meshes::matte({0.5f, 0.5f, 0.5f})), {0, -0.5f, 0}));
     const Picture backed = picture(frame);
-    const auto at = [](const Picture& p, double x, double y) { return size_t(y * p.height) * size_t(p.width) + size_t(x * p.width); };
+    const auto at = [](const Picture& p, double x, double y) {
+        return size_t(y * p.height) * size_t(p.width) + size_t(x * p.width);
+    };
     EXPECT_TRUE(std::isfinite(holes.depth[at(holes, 0.42, 0.42)]));
     EXPECT_TRUE(std::isinf(holes.depth[at(holes, 0.58, 0.42)]));
     EXPECT_NEAR(backed.depth[at(backed, 0.42, 0.42)], 2.5f, 0.1f);
     EXPECT_NEAR(backed.depth[at(backed, 0.55, 0.44)], 3.0f, 0.1f);
     EXPECT_GT(backed.rgba[4 * at(backed, 0.55, 0.44)], 0.1f) << "lit through the hole";
+}
+
+// What the camera turns away from is not drawn, and nothing that it sees is lost.
+TEST_F(MeshGpu, OnlyPartsOutOfSightAreNotDrawn) {
+    Frame all = frame_with(speck());
+    const auto ball = meshes::sphere(0.4f, 16, meshes::of_material(kClay));
+    for (int i = 0; i < 24; ++i) {
+        const float a = 0.2618f * float(i);
+        all.meshes.push_back(meshes::at(ball, {3 * std::sin(a), 0.4f * float(i % 5) - 0.8f, 3 * std::cos(a)}));
+    }
+    all.camera.position = {0, 0, 0};
+    uint64_t most = 0, least = ~uint64_t{0};
+    for (int turn = 0; turn < 6; ++turn) {
+        const float a = 1.1f * float(turn);
+        all.camera.target = {std::sin(a), 0.3f * std::sin(2 * a), std::cos(a)};
+        const Picture p = picture(all, View::Depth, 64, 48);
+        const RenderStats stats = renderer->stats();
+        EXPECT_EQ(stats.triangles, 24 * ball->triangle_count());
+        most = std::max(most, stats.triangles_drawn), least = std::min(least, stats.triangles_drawn);
+        const MeshSet set = make_mesh_set(all);
+        const MeshTrace trace(set);
+        const shade::CameraParams eye = shade::camera_params(all.camera, 64, 48);
+        for (int y = 0; y < 48; ++y) {
+            for (int x = 0; x < 64; ++x) {
+                const vec3 d = normalize(shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f));
+                const auto hit = trace.hit({0, 0, 0}, {d.x, d.y, d.z}, 1e3);
+                const float seen = p.depth[size_t(64 * y + x)];
+                if (hit && std::fabs(dot(d, {float(hit->face.x), float(hit->face.y), float(hit->face.z)})) > 0.05f) {
+                    EXPECT_NEAR(seen, hit->t, 1e-4 * hit->t) << x << " " << y;
+                }
+            }
+        }
+    }
+    EXPECT_LT(most, 24 * ball->triangle_count() / 2);
+    EXPECT_GT(least, 0u);
+    all.camera.target = {0, 9, 0.1f};
+    const Picture up = picture(all, View::Depth, 64, 48);
+    EXPECT_EQ(renderer->stats().triangles_drawn, 0u);
+    for (const float d : up.depth) EXPECT_TRUE(std::isinf(d));
 }
 
 TEST_F(MeshGpu, TilesOfALargePictureJoin) {

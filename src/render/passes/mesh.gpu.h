@@ -13,9 +13,9 @@ using uint = uint32_t;
 
 // 44 bytes, in words.
 struct MeshVertex {
-    float x, y, z;   // metres, in the part's own frame
-    uint normal;     // octahedral
-    uint tangent;    // octahedral; lowest bit: the bitangent is -cross(normal, tangent)
+    float x, y, z;            // metres, in the part's own frame
+    uint normal;              // octahedral
+    uint tangent;             // octahedral; lowest bit: the bitangent is -cross(normal, tangent)
     uint color_rg, color_ba;  // linear, 16 bits each
     float u0, v0, u1, v1;
 };
@@ -83,6 +83,7 @@ struct MeshDrawPush {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MeshVertex) == 44 && sizeof(MeshPart) == 176 && sizeof(MeshNode) == 32 && sizeof(MeshSurface) == 192);
+static_assert(sizeof(MeshVertex) == 44 && sizeof(MeshPart) == 176 && sizeof(MeshNode) == 32 &&
+              sizeof(MeshSurface) == 192);
 }  // namespace kiln::render
 #endif

@@ -1,8 +1,8 @@
 #version 460
 // SPDX-License-Identifier: MIT
 // What meshes hide of each light's disc, multiplied into the fractions that the field leaves. One walk through the trees of boxes a light,
-// with the whole cone of rays at once: every triangle on the way covers those of 256 places on the disc that lie behind it, and what is
-// covered is a bit each. No noise, no bias: rays start on the triangle itself.
+// with the whole cone of rays at once: every triangle on the way covers a part of the disc, which is
+// kept as bits. No noise, no bias: rays start on the triangle itself.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -37,12 +37,10 @@ layout(push_constant) uniform Push { ShadowPush push; };
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
 
-// Places on the disc, on a spiral of golden angles: even in area, and in every direction (Vogel, "A better way to construct the sunflower
-// head", 1979). What a straight edge leaves of them is off by at most 0.02 of the disc.
-const uint kDiscPlaces = 256u;
-const uint kDiscWords = kDiscPlaces / 32u;
-const float kGoldenCos = -0.7373688781;
-const float kGoldenSin = 0.6754902943;
+// The disc is looked at on 32 chords that stand for strips of equal area, each in 32 pieces: what a triangle covers of a chord is a stretch of
+// bits. A straight edge along the chords is off by at most half a strip, 1/64 of the disc; any other by less.
+const uint kChords = 32u;
+const float kChordPlaces[16] = float[16](0.024546, 0.073698, 0.123030, 0.172668, 0.222749, 0.273427, 0.324877, 0.377309, 0.430984, 0.486234, 0.543509, 0.603449, 0.667038, 0.735969, 0.813746, 0.911369);  // of the upper half: where (i + 0.5) / 32 of the disc is below
 
 // All rays from a point to a light's disc: along + x across + y up, x² + y² <= 1; a ray's parameter counts metres along its middle.
 struct Cone {
@@ -111,10 +109,17 @@ bool is_hole(MeshSurface s, uint v[3], vec3 w) {
     return alpha < s.alpha_cutoff;
 }
 
-uint covered[kDiscWords];
+uint covered[kChords];
 bool all_covered;
 
-// Adds the places of the disc that the triangle covers.
+// The bits from `first` to `last`.
+uint stretch(float first, float last) {
+    int from = max(int(ceil(first)), 0);
+    int to = min(int(floor(last)), 31);
+    return to < from ? 0u : (0xffffffffu >> uint(31 - (to - from))) << uint(from);
+}
+
+// Adds what the triangle covers.
 void cover(Cone c, MeshPart part, uint triangle, bool hard) {
     uint corner[3];
     vec3 p[3];
@@ -122,44 +127,58 @@ void cover(Cone c, MeshPart part, uint triangle, bool hard) {
         corner[i] = mesh_corner(part, triangle, i);
         p[i] = vertex_position(corner[i]) - c.from;
     }
-    // Volumes with the ray and two corners each: of one sign where the ray's line meets the triangle. All are linear on the disc.
-    vec3 e0 = cross(p[1], p[2]);
-    vec3 e1 = cross(p[2], p[0]);
-    vec3 e2 = cross(p[0], p[1]);
+    // Volumes of the ray and two corners each, linear on the disc. A ray meets the triangle where they have the sign that the triangle's plane
+    // has seen from its start; and behind `last`, where the fourth, of the ray and the whole triangle, is too small.
     vec3 n = cross(p[1] - p[0], p[2] - p[0]);
-    vec4 middle = vec4(dot(e0, c.along), dot(e1, c.along), dot(e2, c.along), dot(n, c.along));
+    float height = dot(n, p[0]);
+    if (height == 0.0) return;
+    float side = height < 0.0 ? -1.0 : 1.0;
+    vec3 e0 = side * cross(p[1], p[2]);
+    vec3 e1 = side * cross(p[2], p[0]);
+    vec3 e2 = side * cross(p[0], p[1]);
+    n *= side * c.last;
+    vec4 middle = vec4(dot(e0, c.along), dot(e1, c.along), dot(e2, c.along), dot(n, c.along) - abs(height));
     vec4 by_x = vec4(dot(e0, c.across), dot(e1, c.across), dot(e2, c.across), dot(n, c.across));
     vec4 by_y = vec4(dot(e0, c.up), dot(e1, c.up), dot(e2, c.up), dot(n, c.up));
-    float height = dot(n, p[0]);
     vec4 reach = sqrt(by_x * by_x + by_y * by_y);
-    vec4 low = middle - reach;
-    vec4 high = middle + reach;
-    if (any(lessThan(high.xyz, vec3(0.0))) && any(greaterThan(low.xyz, vec3(0.0)))) return;
+    if (any(lessThan(middle + reach, vec4(0.0)))) return;
     bool holes = (part.flags & kMeshMask) != 0u;
-    // 0 < height / w < last for the whole disc, behind all of the triangle: nothing is left to see.
-    float ahead_low = height < 0.0 ? -high.w : low.w;
-    float size = abs(height);
-    if (!holes && (all(greaterThan(low.xyz, vec3(0.0))) || all(lessThan(high.xyz, vec3(0.0)))) && ahead_low * c.last > size && size > 0.0) {
+    if (hard) {
+        all_covered = !holes || !is_hole(mesh_surfaces[part.surface], corner, middle.xyz / (middle.x + middle.y + middle.z));
+        return;
+    }
+    if (!holes && all(greaterThanEqual(middle - reach, vec4(0.0)))) {
         all_covered = true;
         return;
     }
-    uint places = hard ? 1u : kDiscPlaces;
-    vec2 turn = vec2(1.0, 0.0);
-    uint left = 0u;  // bits still to see
-    for (uint word = 0u; word * 32u < places; ++word) {
-        uint bits = covered[word];
-        for (uint i = 0u; i < min(32u, places); ++i) {
-            float r = hard ? 0.0 : sqrt((float(32u * word + i) + 0.5) / float(kDiscPlaces));
-            vec4 e = middle + (r * turn.x) * by_x + (r * turn.y) * by_y;
-            turn = vec2(turn.x * kGoldenCos - turn.y * kGoldenSin, turn.x * kGoldenSin + turn.y * kGoldenCos);
-            bool in_line = all(greaterThanEqual(e.xyz, vec3(0.0))) || all(lessThanEqual(e.xyz, vec3(0.0)));
-            float ahead = e.w < 0.0 ? -height : height;
-            if (!in_line || e.w == 0.0 || ahead <= 0.0 || ahead >= c.last * abs(e.w)) continue;
-            if (holes && is_hole(mesh_surfaces[part.surface], corner, e.xyz / (e.x + e.y + e.z))) continue;
-            bits |= 1u << i;
+    uint left = 0u;  // bits that are still seen
+    for (uint i = 0u; i < kChords; ++i) {
+        uint before = covered[i];
+        if (before == 0xffffffffu) continue;
+        float x = i < 16u ? -kChordPlaces[15u - i] : kChordPlaces[i - 16u];
+        float half_length = sqrt(1.0 - x * x);
+        vec4 a = middle + x * by_x;
+        vec4 b = half_length * by_y;
+        // a + b y >= 0, for y from -1 to 1.
+        vec4 root = -a / b;
+        vec4 above = mix(vec4(-1.0), root, greaterThan(b, vec4(0.0)));
+        vec4 below = mix(vec4(1.0), root, lessThan(b, vec4(0.0)));
+        float first = max(max(max(above.x, above.y), max(above.z, above.w)), -1.0);
+        float last = min(min(min(below.x, below.y), min(below.z, below.w)), 1.0);
+        bool none = any(lessThan(a + abs(b), vec4(0.0)));
+        // The pieces of neighbouring chords lie beside each other's edges, not in rows.
+        float shift = fract(float(i) * 0.618034);
+        uint bits = none ? 0u : stretch(16.0 * (first + 1.0) - shift, 16.0 * (last + 1.0) - shift);
+        if (holes) {
+            for (uint k = 0u; k < 32u; k += 4u) {
+                if (((bits >> k) & 15u) == 0u) continue;
+                float y = (float(k) + 1.5 + shift) / 16.0 - 1.0;
+                vec3 e = a.xyz + y * b.xyz;
+                if (is_hole(mesh_surfaces[part.surface], corner, e / (e.x + e.y + e.z))) bits &= ~(15u << k);
+            }
         }
-        covered[word] = bits;
-        left |= hard ? ~bits & 1u : ~bits;
+        covered[i] = before | bits;
+        left |= ~(before | bits);
     }
     all_covered = left == 0u;
 }
@@ -173,7 +192,7 @@ uint own_triangle = 0u;
 float unhidden(vec3 from, vec3 l, float tan_radius, float distance) {
     Basis basis = basis_around(l);
     bool hard = tan_radius <= 0.0;
-    for (uint i = 0u; i < kDiscWords; ++i) covered[i] = 0u;
+    for (uint i = 0u; i < kChords; ++i) covered[i] = 0u;
     all_covered = false;
     Cone cone = make_cone(from, l, basis.tangent * tan_radius, basis.bitangent * tan_radius, distance);
     uint top = nodes[0].skip;
@@ -206,8 +225,8 @@ float unhidden(vec3 from, vec3 l, float tan_radius, float distance) {
     if (all_covered) return 0.0;
     if (hard) return 1.0;
     int hidden = 0;
-    for (uint i = 0u; i < kDiscWords; ++i) hidden += bitCount(covered[i]);
-    return 1.0 - float(hidden) / float(kDiscPlaces);
+    for (uint i = 0u; i < kChords; ++i) hidden += bitCount(covered[i]);
+    return 1.0 - float(hidden) / float(32u * kChords);
 }
 
 void main() {

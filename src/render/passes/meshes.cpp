@@ -48,7 +48,8 @@ Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const 
     const auto draw = [&](const RasterKernel& kernel, uint32_t first, uint32_t count, bool holes) {
         if (count == 0) return;
         const DrawCall call{.vertices = 3 * kMeshCluster, .instances = count};
-        std::vector<Use> uses{g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners), g.read(m.vertices)};
+        std::vector<Use> uses{g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners),
+                              g.read(m.vertices)};
         if (holes) {
             uses.push_back(g.read(m.surfaces));
             for (const Image& page : m.pages) uses.push_back(g.read(page));
@@ -61,29 +62,31 @@ Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const 
     draw(kMeshOneSided, 0, m.one_sided, false);
     draw(kMeshDoubleSidedDraw, m.one_sided, m.double_sided, false);
     draw(kMeshMasked, m.one_sided + m.double_sided, m.masked, true);
+    if (load == rhi::Load::Clear) g.clear(ids);  // nothing is in sight
     Image out = g.create("visibility with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kMeshSee, in.size,
-               {g.uniform(in.frame), g.read(in.rays), g.read(m.parts), g.read(m.corners), g.read(m.vertices), g.read(visibility),
-                g.read(refined), g.read(ids), g.write(out)});
+               {g.uniform(in.frame), g.read(in.rays), g.read(m.parts), g.read(m.corners), g.read(m.vertices),
+                g.read(visibility), g.read(refined), g.read(ids), g.write(out)});
     return out;
 }
 
 void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface) {
     const MeshHandles& m = in.meshes;
-    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),          g.read(m.parts),
-                          g.read(m.corners),   g.read(m.vertices),       g.read(m.surfaces),
+    std::vector<Use> uses{g.uniform(in.frame),  g.read(in.rays),        g.read(m.parts),
+                          g.read(m.corners),    g.read(m.vertices),     g.read(m.surfaces),
                           g.read(surface.seen), g.write(surface.words), g.write(surface.depth)};
     for (const Image& page : m.pages) uses.push_back(g.read(page));
     uses.push_back(g.sampler(kTrilinear));
     g.dispatch(kMeshResolve, in.size, uses);
 }
 
-Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Image& fractions, const ShadowPush& push) {
+Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Image& fractions,
+                    const ShadowPush& push) {
     const MeshHandles& m = in.meshes;
     Image out = g.create("visible fractions with meshes", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
-    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),    g.read(in.lights),     g.read(m.parts),
-                          g.read(m.corners),   g.read(m.vertices), g.read(m.surfaces),    g.read(m.nodes),
-                          g.read(surface.seen), g.read(surface.words), g.read(fractions), g.write(out)};
+    std::vector<Use> uses{g.uniform(in.frame),  g.read(in.rays),       g.read(in.lights),  g.read(m.parts),
+                          g.read(m.corners),    g.read(m.vertices),    g.read(m.surfaces), g.read(m.nodes),
+                          g.read(surface.seen), g.read(surface.words), g.read(fractions),  g.write(out)};
     for (size_t page = 0; page < kMeshPages; ++page) uses.push_back(g.read(m.pages[page]));
     uses.push_back(g.sampler(kTrilinear));
     g.dispatch(kMeshShadow, in.size, uses, push);
