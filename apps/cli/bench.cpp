@@ -137,6 +137,7 @@ void add_bench(CLI::App& app, Run& run) {
     verb->add_option("--kind", o->bench.kinds, "scene: 0 pebbles, 1 carve, 2 cluster; several as 0,1,2 (default 0)")
         ->delimiter(',');
     verb->add_option("--seed", o->bench.seed, "of the scene (default 5)");
+    verb->add_option("--runs", o->bench.runs, "a row is the least of so many (default 7)");
     verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)");
     verb->add_option("--threads", o->bench.threads, "threads of every row (default: 1, and rows for all cores beside)")
         ->check(CLI::Range(1, 1024));

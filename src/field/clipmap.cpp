@@ -608,7 +608,7 @@ void Clipmap::settle() {
         Level& l = levels_[size_t(level)];
         const CellBox window = this->window(level);
         int64_t cells = 0;
-        for (const CellBox& box : l.changed) cells += volume(wider(box, kMaxJump));
+        for (const CellBox& box : l.changed) cells += volume(wider(box, kMaxJump - 1));
         if (cells > all) l.changed.assign(1, window);
         for (const CellBox& box : l.changed) {
             each_cell(common(wider(box, 1), window), [&](ivec3 c) {
@@ -621,7 +621,7 @@ void Clipmap::settle() {
                 }
                 l.cells.set(c.x, c.y, c.z, (word & ~kCellFades) | (beside ? kCellFades : 0u));
             });
-            const CellBox reached = wider(box, kMaxJump);
+            const CellBox reached = wider(box, kMaxJump - 1);
             const ivec3 size = reached.max - reached.min;
             update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);
         }

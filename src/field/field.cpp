@@ -373,7 +373,7 @@ private:
             return;
         }
         for (const CellBox& box : occupancy_changes_) {
-            if (!box.empty()) update_jumps(out_->cells_, grown(box, kMaxJump, size_));
+            if (!box.empty()) update_jumps(out_->cells_, grown(box, kMaxJump - 1, size_));
         }
     }
 

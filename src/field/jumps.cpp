@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Occupancy as one bit a cell: cells within k of a brick are the occupied ones dilated k times by one cell, an axis at a time, 64 cells an
-// operation. What the k-th dilation adds has jump k.
+// operation. D(k), the k-th dilation, holds D(k - 1): a cell's jump is the number of k in 0 … 6 whose D(k) does not have it.
 
 #include "field/jumps.h"
 
@@ -12,44 +12,89 @@
 namespace kiln::field {
 namespace {
 
-// Bits of a box of cells; rows along x begin at multiples of kCellPage, so that a page's row of cells is one byte.
+constexpr int kReach = kMaxJump - 1;  // from further away a brick changes no jump
+static_assert(kReach == 6);
+
+// Rows of cells, [y0, y1) x [z0, z1).
+struct Rows {
+    int y0, y1, z0, z1;
+};
+
+// Bits of a box of cells; rows along x begin at multiples of kCellPage, so that a page's row of cells is one byte. Around them is
+// a border of one empty row.
 struct BitBox {
     ivec3 size;
-    size_t row_words;
+    size_t row_words, plane_words;
     std::vector<uint64_t> words;
 
     explicit BitBox(ivec3 s)
-        : size(s), row_words((size_t(s.x) + 63) / 64), words(row_words * size_t(s.y) * size_t(s.z)) {}
-    uint64_t* row(int y, int z) { return words.data() + (size_t(z) * size_t(size.y) + size_t(y)) * row_words; }
-    uint8_t byte(int x8, int y, int z) { return uint8_t(row(y, z)[size_t(x8) / 8] >> (x8 % 8 * 8)); }
+        : size(s),
+          row_words((size_t(s.x) + 63) / 64),
+          plane_words(row_words * (size_t(s.y) + 2)),
+          words(plane_words * (size_t(s.z) + 2)) {}
+    uint64_t* row(int y, int z) { return words.data() + size_t(z + 1) * plane_words + size_t(y + 1) * row_words; }
 };
 
-// from dilated by one cell into `to`; `between` is scratch of the same shape.
-void dilate(const BitBox& from, BitBox& between, BitBox& to) {
-    const size_t w = from.row_words, plane = w * size_t(from.size.y), n = from.words.size();
-    for (size_t i = 0; i < n; ++i) {
-        const uint64_t here = from.words[i];
-        uint64_t near = here | here << 1 | here >> 1;
-        if (i % w > 0) near |= from.words[i - 1] >> 63;
-        if (i % w + 1 < w) near |= from.words[i + 1] << 63;
-        to.words[i] = near;
-    }
-    for (int z = 0; z < from.size.z; ++z) {
-        for (size_t i = 0; i < plane; ++i) {
-            const size_t at = size_t(z) * plane + i;
-            uint64_t near = to.words[at];
-            if (i >= w) near |= to.words[at - w];
-            if (i + w < plane) near |= to.words[at + w];
-            between.words[at] = near;
+// The rows of `from` dilated by one cell, into `to`. Reads `from` one row further.
+void dilate(BitBox& from, BitBox& by_x, BitBox& by_y, BitBox& to, const Rows& rows) {
+    const size_t w = from.row_words, n = w * size_t(rows.y1 - rows.y0), plane = from.plane_words;
+    for (int z = rows.z0 - 1; z <= rows.z1; ++z) {
+        const uint64_t* const old = from.row(rows.y0 - 1, z);
+        uint64_t* const mid = by_x.row(rows.y0 - 1, z);
+        for (size_t i = 0; i < n + 2 * w; ++i) mid[i] = old[i] | old[i] << 1 | old[i] >> 1;
+        for (size_t first = 0; w > 1 && first < n + 2 * w; first += w) {
+            for (size_t i = first + 1; i < first + w; ++i) {
+                mid[i] |= old[i - 1] >> 63;
+                mid[i - 1] |= old[i] << 63;
+            }
         }
+        uint64_t* const near = by_y.row(rows.y0, z);
+        for (size_t i = 0; i < n; ++i) near[i] = mid[i] | mid[i + w] | mid[i + 2 * w];
     }
-    for (size_t i = 0; i < n; ++i) {
-        uint64_t near = between.words[i];
-        if (i >= plane) near |= between.words[i - plane];
-        if (i + plane < n) near |= between.words[i + plane];
-        to.words[i] = near;
+    for (int z = rows.z0; z < rows.z1; ++z) {
+        const uint64_t* const near = by_y.row(rows.y0, z);
+        uint64_t* const out = to.row(rows.y0, z);
+        for (size_t i = 0; i < n; ++i) out[i] = near[i - plane] | near[i] | near[i + plane];
     }
 }
+
+// The three bits of the jumps of some rows of a box.
+class JumpBits {
+public:
+    JumpBits(const BitBox& box, const Rows& rows)
+        : rows_(rows),
+          row_words_(box.row_words),
+          plane_words_(box.row_words * size_t(rows.y1 - rows.y0)),
+          size_(plane_words_ * size_t(rows.z1 - rows.z0)),
+          words_(3 * size_, ~uint64_t(0)) {}
+
+    // D(k), for k from 0 to 6. A cell that j of them do not have is in all from D(j) on, so of j every one of those turns bit 0, of
+    // D(1), D(3) and D(5) each turns bit 1, and D(3) turns bit 2: all begin as 7.
+    void add(BitBox& dilated, int k) {
+        for (int z = rows_.z0; z < rows_.z1; ++z) {
+            const uint64_t* const near = dilated.row(rows_.y0, z);
+            uint64_t* const bits = words_.data() + size_t(z - rows_.z0) * plane_words_;
+            for (size_t i = 0; i < plane_words_; ++i) bits[i] ^= near[i];
+            if (k % 2 == 0) continue;
+            for (size_t i = 0; i < plane_words_; ++i) bits[size_ + i] ^= near[i];
+            if (k != 3) continue;
+            for (size_t i = 0; i < plane_words_; ++i) bits[2 * size_ + i] ^= near[i];
+        }
+    }
+    // Of eight cells.
+    uint8_t byte(int bit, int x8, int y, int z) const {
+        const size_t at = size_t(z - rows_.z0) * plane_words_ + size_t(y - rows_.y0) * row_words_ + size_t(x8) / 8;
+        return uint8_t(words_[size_t(bit) * size_ + at] >> (x8 % 8 * 8));
+    }
+
+private:
+    Rows rows_;
+    size_t row_words_, plane_words_, size_;
+    std::vector<uint64_t> words_;
+};
+
+// A row of a page's cells.
+using Eight __attribute__((vector_size(32))) = uint32_t;
 
 // Word k of entry b is bit k of b.
 constexpr auto kSpread = [] {
@@ -59,6 +104,7 @@ constexpr auto kSpread = [] {
     }
     return out;
 }();
+void spread(uint8_t bits, Eight& out) { std::memcpy(&out, kSpread[bits].data(), sizeof out); }
 
 // Where a row of cells lies in its page.
 size_t row_of(int y, int z) { return size_t(((z & (kCellPage - 1)) * kCellPage + (y & (kCellPage - 1))) * kCellPage); }
@@ -112,64 +158,57 @@ CellBox joined(const CellBox& a, const CellBox& b) {
 
 void update_jumps(CellMap& cells, const CellBox& box) {
     if (box.empty()) return;
-    CellBox wide = cells.wraps() ? CellBox{box.min - ivec3{kMaxJump, kMaxJump, kMaxJump},
-                                           box.max + ivec3{kMaxJump, kMaxJump, kMaxJump}}
-                                 : grown(box, kMaxJump, cells.size());
+    CellBox wide = cells.wraps()
+                       ? CellBox{box.min - ivec3{kReach, kReach, kReach}, box.max + ivec3{kReach, kReach, kReach}}
+                       : grown(box, kReach, cells.size());
     wide.min.x &= ~(kCellPage - 1);
     const ivec3 size = wide.max - wide.min;
-    BitBox occupied(size), near(size), next(size), between(size);
+    BitBox near(size), next(size), by_x(size), by_y(size);
     each_page(cells, wide, [&](size_t page, const CellBox& part) {
         const CellMap::Words::Page* const words = cells.words().find(page);
         if (words == nullptr) return;
         const int x8 = (part.min.x - wide.min.x) / kCellPage;
         for (int z = part.min.z; z < part.max.z; ++z) {
             for (int y = part.min.y; y < part.max.y; ++y) {
-                occupied.row(y - wide.min.y, z - wide.min.z)[size_t(x8) / 8] |=
+                near.row(y - wide.min.y, z - wide.min.z)[size_t(x8) / 8] |=
                     uint64_t(top_bits(words->data() + row_of(y, z))) << (x8 % 8 * 8);
             }
         }
     });
-    // The jump's three bits, 7 until a dilation arrives.
-    std::array<BitBox, 3> jump{near, near, near};
-    for (BitBox& plane : jump) std::fill(plane.words.begin(), plane.words.end(), ~uint64_t(0));
-    near = occupied;
-    for (uint32_t k = 1; k < uint32_t(kMaxJump); ++k) {
-        dilate(near, between, next);
-        uint64_t any = 0;
-        for (size_t i = 0; i < next.words.size(); ++i) {
-            const uint64_t arrived = next.words[i] & ~near.words[i];
-            any |= arrived;
-            for (uint32_t bit = 0; bit < 3; ++bit) {
-                if ((k >> bit & 1u) == 0) jump[bit].words[i] &= ~arrived;
-            }
-        }
-        if (any == 0) break;
+    const Rows rows{box.min.y - wide.min.y, box.max.y - wide.min.y, box.min.z - wide.min.z, box.max.z - wide.min.z};
+    JumpBits jump(near, rows);
+    jump.add(near, 0);
+    for (int k = 1; k <= kReach; ++k) {
+        const int by = kReach - k;  // the dilations to come read so much further
+        dilate(near, by_x, by_y, next,
+               {std::max(rows.y0 - by, 0), std::min(rows.y1 + by, size.y), std::max(rows.z0 - by, 0),
+                std::min(rows.z1 + by, size.z)});
         std::swap(near, next);
+        jump.add(near, k);
     }
     each_page(cells, box, [&](size_t page, const CellBox& part) {
         const CellMap::Words::Page* old = cells.words().find(page);
         const int cx = part.min.x & ~(kCellPage - 1), x8 = (cx - wide.min.x) / kCellPage;
+        const Eight lanes{0, 1, 2, 3, 4, 5, 6, 7};
+        const Eight ours = Eight(lanes >= uint32_t(part.min.x - cx)) & Eight(lanes < uint32_t(part.max.x - cx));
         for (int z = part.min.z; z < part.max.z; ++z) {
             for (int y = part.min.y; y < part.max.y; ++y) {
-                std::array<uint32_t, kCellPage> had, wanted;
-                if (old != nullptr) {
-                    std::copy_n(old->data() + row_of(y, z), had.size(), had.begin());
-                } else {
-                    had.fill(uint32_t(kMaxJump));
-                }
+                Eight had = Eight{} + uint32_t(kMaxJump);
+                if (old != nullptr) std::memcpy(&had, old->data() + row_of(y, z), sizeof had);
                 const int ly = y - wide.min.y, lz = z - wide.min.z;
-                const auto& low = kSpread[jump[0].byte(x8, ly, lz)];
-                const auto& middle = kSpread[jump[1].byte(x8, ly, lz)];
-                const auto& high = kSpread[jump[2].byte(x8, ly, lz)];
-                for (size_t k = 0; k < had.size(); ++k) {
-                    const uint32_t empty = (had[k] & kCellInside) | low[k] | middle[k] << 1 | high[k] << 2;
-                    wanted[k] = (had[k] & kCellOccupied) != 0 ? had[k] : empty;
-                }
-                for (int x = cx; x < part.min.x; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
-                for (int x = part.max.x; x < cx + kCellPage; ++x) wanted[size_t(x - cx)] = had[size_t(x - cx)];
-                if (wanted == had) continue;
+                Eight low, middle, high;
+                spread(jump.byte(0, x8, ly, lz), low);
+                spread(jump.byte(1, x8, ly, lz), middle);
+                spread(jump.byte(2, x8, ly, lz), high);
+                const Eight found = low | middle << 1 | high << 2;
+                // Zero where nothing changes: in occupied cells, and beyond the box.
+                const Eight changes = (had ^ ((had & kCellInside) | found)) & ours & ((had >> 31) - 1);
+                uint64_t halves[4];
+                std::memcpy(halves, &changes, sizeof changes);
+                if ((halves[0] | halves[1] | halves[2] | halves[3]) == 0) continue;
                 CellMap::Words::Page& mine = cells.words().write_page(page);
-                std::copy(wanted.begin(), wanted.end(), mine.begin() + ptrdiff_t(row_of(y, z)));
+                had ^= changes;
+                std::memcpy(mine.data() + row_of(y, z), &had, sizeof had);
                 old = &mine;
             }
         }

@@ -69,7 +69,7 @@ private:
 /// kMaxJump (also where there is none). All cells of such a cube around an empty cell but its shell are empty; neighbouring empty
 /// cells share a face of texels, on which every value is at least a voxel from 0, and no two neighbouring texels differ by
 /// two voxels: so they all have one sign. Writes only words that differ. On a torus distance wraps too: a jump may be shorter than it
-/// could be, never longer.
+/// could be, never longer. A cell that becomes occupied or empty changes jumps up to kMaxJump - 1 cells away.
 void update_jumps(CellMap& cells, const CellBox& box);
 
 }  // namespace kiln::field

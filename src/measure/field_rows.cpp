@@ -33,6 +33,7 @@ using field::HostBricks;
 /// Point evaluations that the slow way may take for one field; above, it looks at every n-th cell.
 constexpr double kMostSlowWork = 4e10;
 constexpr int kEdits = 20;
+constexpr size_t kCacheWords = size_t(16) << 20;  // 128 MiB: more than caches hold
 constexpr uint32_t kRandomPoints = 2000000;
 constexpr int kRayWidth = 640, kRayHeight = 360;
 
@@ -238,31 +239,37 @@ private:
         double roots = 0;       // a mean edit's
     };
 
-    Turns take_turns(const std::vector<Step>& steps, bool with_peer, bool undo, int threads) {
+    // What takes the caches from an edit, before each.
+    enum class Caches { Warm, Cold };
+
+    // Of ours and the peer's in turn: each makes all edits, one after another, before the other does.
+    Turns take_turns(const std::vector<Step>& steps, bool with_peer, bool undo, int threads,
+                     Caches caches = Caches::Warm) {
         Turns out;
         const bool peer = with_peer && peer_grid() != nullptr;
         State fresh{*program_, made(program_, run_.options.resolution, threads), {}};
         for (uint32_t i = 0; i < edits_.size(); ++i) fresh.rows.push_back(i);
+        std::vector<uint64_t> other(caches == Caches::Cold ? kCacheWords : 0);
+        const auto least = [&](double& to, double seconds) { to = std::min(to, seconds); };
         for (int turn = 0; turn < run_.options.runs; ++turn) {
             State state = fresh;
-            PeerGrid grid(peer ? peers()->copy(peer_grid()) : nullptr);
             out.roots = 0;
             for (uint32_t m = 0; m < steps.size(); ++m) {
-                const auto least = [&](double& to, double seconds) { to = std::min(to, seconds); };
+                for (uint64_t& word : other) ++word;
                 least(out.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
                 out.roots += roots_of(state.bricks.field(), state.bricks.field().jobs()) / kEdits;
-                if (!peer) continue;
+            }
+            if (turn == 0) out.checksum = stored(state.bricks).checksum;
+            for (uint32_t m = undo ? uint32_t(steps.size()) : 0; m-- > 0;)
+                least(out.backwards[m], seconds_of([&] { apply(state, steps[m].back()); }));
+            if (turn == 0 && undo) out.undone = stored(state.bricks).checksum;
+            if (!peer) continue;
+            const PeerGrid grid(peers()->copy(peer_grid()));
+            for (uint32_t m = 0; m < steps.size(); ++m) {
                 const vec3 c = bite(m).node.transform.position;
                 const float center[3] = {c.x, c.y, c.z};
                 least(out.peer[m], seconds_of([&] { peers()->bite(grid.get(), center, kBiteRadius, threads); }));
             }
-            if (turn == 0) out.checksum = stored(state.bricks).checksum;
-            if (!undo) continue;
-            for (uint32_t m = uint32_t(steps.size()); m-- > 0;) {
-                const double seconds = seconds_of([&] { apply(state, steps[m].back()); });
-                out.backwards[m] = std::min(out.backwards[m], seconds);
-            }
-            if (turn == 0) out.undone = stored(state.bricks).checksum;
         }
         return out;
     }
@@ -302,6 +309,14 @@ private:
                 out.roof_ratio = turns.roots / roofs().roots / mean(turns.backwards);
                 run_.add_checked(out, turns.undone, stored(start()).checksum);
             }
+        }
+        if (wanted("edit.cold")) {
+            const auto bites = history([](List& list, uint32_t m) { list.push_back(bite(m)); });
+            run_.stage("edit.cold");
+            const Turns turns = take_turns(bites, false, false, threads, Caches::Cold);
+            BenchRow out = row("edit.cold", mean(turns.forwards) * 1e6, "µs", threads);
+            out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
+            run_.add_checked(out, turns.checksum, rebuilt(after(bites)));
         }
         struct Way {
             const char* name;
@@ -590,7 +605,7 @@ BenchFamily field_family() {
     return {
         {"field",
          "the field of 1000 spheres and boxes: building, editing, sampling, rays, meshes, memory",
-         {"bake", "edit.mean", "edit.worst", "undo", "edit.add", "edit.smooth", "edit.move", "edit.remove",
+         {"bake", "edit.mean", "edit.worst", "undo", "edit.cold", "edit.add", "edit.smooth", "edit.move", "edit.remove",
           "samples.random", "samples.band", "query.single", "rays", "mesh.smooth", "mesh.sharp", "memory.per_voxel"}},
         [](BenchRun& run) {
             for (const int kind : run.options.kinds)

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: MIT
 #include "base/atomic_file.h"
 
+#include "temp_folder.h"
+
 #include <gtest/gtest.h>
 
 #include <fcntl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <csignal>
 #include <filesystem>
@@ -16,26 +17,20 @@
 
 namespace fs = std::filesystem;
 using kiln::AtomicFile;
+using kiln::TempFolder;
 
 namespace {
 
 class AtomicFiles : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string pattern = (fs::temp_directory_path() / "kiln_atomic_XXXXXX").string();
-        ASSERT_NE(mkdtemp(pattern.data()), nullptr);
-        folder = pattern;
-    }
-    void TearDown() override { fs::remove_all(folder); }
-
     std::string path(const char* name) const { return (folder / name).string(); }
     static std::string read(const std::string& file) {
         std::ifstream in(file, std::ios::binary);
         return {std::istreambuf_iterator<char>(in), {}};
     }
-    size_t files() const { return size_t(std::distance(fs::directory_iterator(folder), {})); }
+    size_t files() const { return size_t(std::distance(fs::directory_iterator(folder.path()), {})); }
 
-    fs::path folder;
+    const TempFolder folder;
 };
 
 TEST_F(AtomicFiles, TheOldFileStaysUntilCommit) {
@@ -56,7 +51,7 @@ TEST_F(AtomicFiles, WithoutCommitNothingIsLeftBehind) {
         ASSERT_TRUE(file);
         ASSERT_TRUE(file->write("half"));
         EXPECT_EQ(fs::path(file->temporary_path()).extension(), ".png");
-        EXPECT_EQ(fs::path(file->temporary_path()).parent_path(), folder);
+        EXPECT_EQ(fs::path(file->temporary_path()).parent_path(), folder.path());
         AtomicFile moved = std::move(*file);
         EXPECT_EQ(files(), 1u);
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "base/record_file.h"
+#include "temp_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -24,14 +25,6 @@ std::string bytes_of(const std::string& path) {
 
 class RecordFiles : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "kiln-records-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        folder_ = name;
-        path_ = folder_ + "/a.journal";
-    }
-    void TearDown() override { fs::remove_all(folder_); }
-
     // The bytes of a file of these records.
     std::string made(const std::vector<std::string>& payloads) {
         std::string before;
@@ -42,7 +35,8 @@ protected:
         return bytes_of(path_);
     }
 
-    std::string folder_, path_;
+    const TempFolder folder_;
+    const std::string path_ = (folder_ / "a.journal").string();
 };
 
 const std::vector<std::string> kThree{"one", "", "three, the longest"};

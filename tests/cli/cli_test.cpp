@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // The command line from outside: exit codes, where things are said, and that nothing is left behind.
 
+#include "temp_folder.h"
+
 #include <kiln/world.h>
 
 #include <gmock/gmock.h>
@@ -35,13 +37,6 @@ std::string read(const fs::path& path) {
 // Every test works in a folder of its own.
 class Cli : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "kiln-cli-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        folder_ = name;
-    }
-    void TearDown() override { fs::remove_all(folder_); }
-
     /// Runs `kiln WORDS` by the shell, in the test's folder. `before`: shell words in front.
     Outcome run(const std::string& words, const std::string& before = "") {
         const std::string command =
@@ -58,12 +53,12 @@ protected:
     }
     std::vector<std::string> files() const {
         std::vector<std::string> out;
-        for (const auto& entry : fs::directory_iterator(folder_)) out.push_back(entry.path().filename());
+        for (const auto& entry : fs::directory_iterator(folder_.path())) out.push_back(entry.path().filename());
         std::sort(out.begin(), out.end());
         return out;
     }
 
-    fs::path folder_;
+    const kiln::TempFolder folder_;
 };
 
 void expect_one_line(const Outcome& o, const std::string& what) {

@@ -69,7 +69,7 @@ TEST(Jumps, ChangeOnlyWithinSevenCellsOfAChange) {
     for (int i = 0; i < 12; ++i) {
         const int x = r.below(25), y = r.below(25), z = r.below(25);
         g.cells.set(x, y, z, (g.at(x, y, z) & kCellOccupied) != 0 ? 0u : kCellOccupied | 99u);
-        update_jumps(g.cells, grown({{x, y, z}, {x + 1, y + 1, z + 1}}, kMaxJump, g.size));
+        update_jumps(g.cells, grown({{x, y, z}, {x + 1, y + 1, z + 1}}, kMaxJump - 1, g.size));
         for (int c = 0; c < g.size.z; ++c) {
             for (int b = 0; b < g.size.y; ++b) {
                 for (int a = 0; a < g.size.x; ++a) {

@@ -3,6 +3,7 @@
 #include "image/exr_file.h"
 
 #include "image/file.h"
+#include "temp_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -19,12 +20,11 @@ namespace {
 
 constexpr float kInf = std::numeric_limits<float>::infinity();
 
-std::string temporary(const std::string& name) { return testing::TempDir() + "kiln_image_" + name; }
-
 }  // namespace
 
 TEST(ExrFile, LightComesBackAsHalves) {
-    const std::string path = temporary("light.exr");
+    const TempFolder folder;
+    const std::string path = (folder / "light.exr").string();
     std::mt19937 random(3);
     for (const int channels : {3, 4}) {
         std::vector<float> values(size_t(33 * 17 * channels));
@@ -42,11 +42,11 @@ TEST(ExrFile, LightComesBackAsHalves) {
         EXPECT_EQ(back->values[2], 0);
         for (size_t i = 3; i < values.size(); ++i) ASSERT_NEAR(back->values[i], values[i], values[i] * 0x1p-11f) << i;
     }
-    std::filesystem::remove(path);
 }
 
 TEST(ExrFile, DepthComesBackExactlyWithItsInfinities) {
-    const std::string path = temporary("depth.exr");
+    const TempFolder folder;
+    const std::string path = (folder / "depth.exr").string();
     std::vector<float> depth(20 * 11);
     for (size_t i = 0; i < depth.size(); ++i) depth[i] = i % 7 == 0 ? kInf : 0.1f + float(i) * 1.2345678f;
     ASSERT_TRUE(write_exr_depth(path, 20, 11, depth));
@@ -56,7 +56,6 @@ TEST(ExrFile, DepthComesBackExactlyWithItsInfinities) {
     EXPECT_EQ(back->width, 20);
     EXPECT_EQ(back->height, 11);
     EXPECT_EQ(back->values, depth);
-    std::filesystem::remove(path);
 }
 
 TEST(ExrFile, ErrorsNameTheFileAndLeaveNothingBehind) {
@@ -73,7 +72,8 @@ TEST(ExrFile, ErrorsNameTheFileAndLeaveNothingBehind) {
 }
 
 TEST(ExrFile, CutAndFlippedFilesGiveErrorsOrPixelsNeverCrashes) {
-    const std::string path = temporary("hostile.exr");
+    const TempFolder folder;
+    const std::string path = (folder / "hostile.exr").string();
     std::vector<float> values(24 * 40 * 3);
     for (size_t i = 0; i < values.size(); ++i) values[i] = float(i % 97) * 0.01f;
     ASSERT_TRUE(write_exr(path, 24, 40, 3, values));
@@ -95,5 +95,4 @@ TEST(ExrFile, CutAndFlippedFilesGiveErrorsOrPixelsNeverCrashes) {
             EXPECT_EQ(got->values.size(), size_t(got->width) * size_t(got->height) * size_t(got->channels));
         }
     }
-    std::filesystem::remove(path);
 }

@@ -4,6 +4,7 @@
 
 #include "image/exr_file.h"
 #include "image/png_file.h"
+#include "temp_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -116,8 +117,8 @@ TEST(Flip, FindsAMovedEdgeWhereItIs) {
 }
 
 TEST(Metrics, FilesAreComparedByContent) {
-    const std::string a = testing::TempDir() + "kiln_compare_a.png", b = testing::TempDir() + "kiln_compare_b.png",
-                      c = testing::TempDir() + "kiln_compare_c.exr";
+    const TempFolder folder;
+    const std::string a = (folder / "a.png").string(), b = (folder / "b.png").string(), c = (folder / "c.exr").string();
     Pixels p{8, 8, 3, 8, std::vector<uint16_t>(192, 128)};
     ASSERT_TRUE(write_png(a, p));
     p.values[0] = 255;
@@ -132,5 +133,4 @@ TEST(Metrics, FilesAreComparedByContent) {
     ASSERT_FALSE(sizes);
     EXPECT_NE(sizes.error().message.find("8 x 8"), std::string::npos) << sizes.error().message;
     EXPECT_FALSE(compare_files(a, "/nowhere.png"));
-    for (const std::string& path : {a, b, c}) std::filesystem::remove(path);
 }

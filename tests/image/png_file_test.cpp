@@ -3,6 +3,7 @@
 #include "image/png_file.h"
 
 #include "image/file.h"
+#include "temp_folder.h"
 
 #include <gtest/gtest.h>
 
@@ -16,8 +17,6 @@ using namespace kiln::image;
 
 namespace {
 
-std::string temporary(const std::string& name) { return testing::TempDir() + "kiln_image_" + name; }
-
 Pixels noise(int width, int height, int channels, int bits) {
     Pixels p{width, height, channels, bits, {}};
     std::mt19937 random(7);
@@ -29,7 +28,8 @@ Pixels noise(int width, int height, int channels, int bits) {
 }  // namespace
 
 TEST(PngFile, EveryKindComesBackAsItWasWritten) {
-    const std::string path = temporary("round.png");
+    const TempFolder folder;
+    const std::string path = (folder / "round.png").string();
     for (const int bits : {8, 16}) {
         for (const int channels : {1, 2, 3, 4}) {
             for (const int width : {1, 7, 64}) {
@@ -45,11 +45,11 @@ TEST(PngFile, EveryKindComesBackAsItWasWritten) {
             }
         }
     }
-    std::filesystem::remove(path);
 }
 
 TEST(PngFile, IsMarkedAsSrgbAndAlwaysTheSameBytes) {
-    const std::string path = temporary("marked.png");
+    const TempFolder folder;
+    const std::string path = (folder / "marked.png").string();
     const std::vector<uint8_t> rgba(4 * 6 * 3, 100);
     ASSERT_TRUE(write_png(path, 6, 3, rgba));
     Result<std::vector<std::byte>> first = read_bytes(path);
@@ -59,7 +59,6 @@ TEST(PngFile, IsMarkedAsSrgbAndAlwaysTheSameBytes) {
     EXPECT_EQ(*first, *second);
     const std::string text(reinterpret_cast<const char*>(first->data()), first->size());
     EXPECT_NE(text.find("sRGB"), std::string::npos);
-    std::filesystem::remove(path);
 }
 
 TEST(PngFile, ErrorsNameTheFileAndLeaveNothingBehind) {
@@ -73,17 +72,18 @@ TEST(PngFile, ErrorsNameTheFileAndLeaveNothingBehind) {
     EXPECT_EQ(unwritable.error().kind, ErrorKind::Failed);
     EXPECT_NE(unwritable.error().message.find("/nowhere/at/all.png"), std::string::npos) << unwritable.error().message;
 
-    const std::string path = temporary("text.png");
+    const TempFolder folder;
+    const std::string path = (folder / "text.png").string();
     std::ofstream(path) << "this is no picture";
     const Result<Pixels> text = read_png(path);
     ASSERT_FALSE(text);
     EXPECT_EQ(text.error().message, path + ": not a PNG file");
-    std::filesystem::remove(path);
 }
 
 // A header that promises 30,000 x 30,000 pixels over a few bytes is refused before memory is taken.
 TEST(PngFile, SizesThatTheFileCannotHoldAreRefused) {
-    const std::string path = temporary("huge.png");
+    const TempFolder folder;
+    const std::string path = (folder / "huge.png").string();
     ASSERT_TRUE(write_png(path, noise(2, 2, 4, 8)));
     std::vector<std::byte> bytes = *read_bytes(path);
     auto crc = [&](size_t from, size_t to) {
@@ -104,11 +104,11 @@ TEST(PngFile, SizesThatTheFileCannotHoldAreRefused) {
     const Result<Pixels> got = decode_png(bytes, "huge.png");
     ASSERT_FALSE(got);
     EXPECT_NE(got.error().message.find("more pixels than the file can hold"), std::string::npos) << got.error().message;
-    std::filesystem::remove(path);
 }
 
 TEST(PngFile, CutAndFlippedFilesGiveErrorsOrPixelsNeverCrashes) {
-    const std::string path = temporary("hostile.png");
+    const TempFolder folder;
+    const std::string path = (folder / "hostile.png").string();
     std::mt19937 random(11);
     for (const int bits : {8, 16}) {
         ASSERT_TRUE(write_png(path, noise(16, 9, 3, bits)));
@@ -128,5 +128,4 @@ TEST(PngFile, CutAndFlippedFilesGiveErrorsOrPixelsNeverCrashes) {
             }
         }
     }
-    std::filesystem::remove(path);
 }

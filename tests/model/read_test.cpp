@@ -4,6 +4,7 @@
 #include "files.h"
 
 #include "model/triangles.h"
+#include "temp_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <random>
-#include <unistd.h>
 
 namespace kiln::model {
 namespace {
@@ -65,17 +65,12 @@ double volume(const Triangles& mesh) {
 
 class Folder : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (std::filesystem::temp_directory_path() / "kiln-model-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        path_ = name + "/";
-    }
-    void TearDown() override { std::filesystem::remove_all(path_); }
     std::string write(const std::string& name, const std::string& bytes) {
         std::ofstream(path_ + name, std::ios::binary) << bytes;
         return path_ + name;
     }
-    std::string path_;
+    const TempFolder folder_;
+    const std::string path_ = folder_.string() + "/";
 };
 using ReadFile = Folder;
 

@@ -4,6 +4,7 @@
 #include "rhi_test.h"
 
 #include "shaders/rhi_add.spv.h"
+#include "temp_folder.h"
 
 #include <cstdlib>
 #include <filesystem>
@@ -18,10 +19,8 @@ namespace fs = std::filesystem;
 class PipelineCacheFolder : public VulkanTest {
 protected:
     void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "kiln-cache-XXXXXX").string();
-        folder_ = mkdtemp(name.data());
         if (const char* old = std::getenv("XDG_CACHE_HOME")) old_ = old;
-        setenv("XDG_CACHE_HOME", folder_.c_str(), 1);
+        setenv("XDG_CACHE_HOME", folder_.string().c_str(), 1);
         pipeline_cache_ = true;
     }
     void TearDown() override {
@@ -31,8 +30,7 @@ protected:
         } else {
             unsetenv("XDG_CACHE_HOME");
         }
-        fs::permissions(folder_, fs::perms::owner_all);
-        fs::remove_all(folder_);
+        fs::permissions(folder_.path(), fs::perms::owner_all);
     }
     void make_a_pipeline_and_quit() {
         VulkanTest::SetUp();
@@ -47,11 +45,11 @@ protected:
     // Ours; drivers keep caches of their own beside them.
     std::vector<fs::path> files() const {
         std::vector<fs::path> out;
-        for (const auto& f : fs::recursive_directory_iterator(folder_))
+        for (const auto& f : fs::recursive_directory_iterator(folder_.path()))
             if (f.is_regular_file() && f.path().string().find("/kiln/") != std::string::npos) out.push_back(f.path());
         return out;
     }
-    fs::path folder_;
+    const TempFolder folder_;
     std::optional<std::string> old_;
 };
 

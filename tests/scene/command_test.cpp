@@ -2,6 +2,7 @@
 #include "scene/command.h"
 
 #include "scene_text.h"
+#include "temp_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -91,7 +92,8 @@ TEST(Commands, FaultsHaveAPlaceAndAMendAndChangeNothing) {
 }
 
 TEST(Commands, AFileOfThemIsReadByTimeAndItsFaultsHaveLines) {
-    const std::string path = testing::TempDir() + "/edits.jsonl";
+    const TempFolder folder;
+    const std::string path = (folder / "edits.jsonl").string();
     const auto read = [&](const std::string& text) {
         std::ofstream(path, std::ios::binary) << text;
         return read_timed_commands(path);

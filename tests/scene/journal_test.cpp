@@ -3,6 +3,7 @@
 
 #include "random_changes.h"
 #include "scene_text.h"
+#include "temp_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -49,15 +50,7 @@ const std::string kScene =
 
 class Journals : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "kiln-journal-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        folder_ = name;
-        scene_ = folder_ / "s.kiln.json";
-        journal_ = folder_ / "s.kiln.json.journal";
-        write(scene_, kScene);
-    }
-    void TearDown() override { fs::remove_all(folder_); }
+    void SetUp() override { write(scene_, kScene); }
 
     World open() {
         auto world = World::open(scene_);
@@ -73,7 +66,8 @@ protected:
         write(journal_, journal);
     }
 
-    fs::path folder_, scene_, journal_;
+    const TempFolder folder_;
+    const fs::path scene_ = folder_ / "s.kiln.json", journal_ = folder_ / "s.kiln.json.journal";
 };
 
 TEST_F(Journals, EveryChangeIsThereBeforeItsCallReturns) {
@@ -559,10 +553,10 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
     testing::Test::RecordProperty("calls", std::to_string(acts));
 }
 
-TEST_F(Journals, KilledAtAnyMomentNoAcknowledgedChangeIsLost) { kill_rounds(folder_, 25, 20000); }
+TEST_F(Journals, KilledAtAnyMomentNoAcknowledgedChangeIsLost) { kill_rounds(folder_.path(), 25, 20000); }
 
 class JournalsSlow : public Journals {};
-TEST_F(JournalsSlow, AThousandKillsLoseNothing) { kill_rounds(folder_, 1000, 30000); }
+TEST_F(JournalsSlow, AThousandKillsLoseNothing) { kill_rounds(folder_.path(), 1000, 30000); }
 
 }  // namespace
 }  // namespace kiln

@@ -3,6 +3,7 @@
 #include "scene/mesh_file.h"
 
 #include "scene_text.h"
+#include "temp_folder.h"
 
 #include <kiln/world.h>
 
@@ -74,13 +75,7 @@ std::string read(const fs::path& path) {
 
 class MeshFile : public testing::Test {
 protected:
-    void SetUp() override {
-        std::string name = (fs::temp_directory_path() / "kiln-mesh-XXXXXX").string();
-        ASSERT_NE(::mkdtemp(name.data()), nullptr);
-        folder_ = name;
-    }
-    void TearDown() override { fs::remove_all(folder_); }
-    fs::path folder_;
+    const TempFolder folder_;
 };
 
 TEST(WorldMesh, BundledScenesAreClosedSmoothAndSharp) {
@@ -367,7 +362,7 @@ TEST_F(MeshFile, UnwritableAndUnknownNamesLeaveNothingBehind) {
     fs::create_directory(folder_ / "b.mtl");
     EXPECT_FALSE(mesh.save(folder_ / "b.obj")) << "its material file cannot be written";
     fs::remove(folder_ / "b.mtl");
-    EXPECT_TRUE(fs::is_empty(folder_));
+    EXPECT_TRUE(fs::is_empty(folder_.path()));
     EXPECT_EQ(mesh_format("A.GLB"), MeshFormat::Glb);
 }
 

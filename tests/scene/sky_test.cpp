@@ -4,6 +4,7 @@
 #include "image/exr_file.h"
 #include "render/lib/pack.h"
 #include "scene_text.h"
+#include "temp_folder.h"
 
 #include <kiln/world.h>
 
@@ -27,12 +28,6 @@ const char* const kWhite = "\"materials\": {\"white\": {\"base_color\": [1, 1, 1
 
 class SkyImages : public testing::Test {
 protected:
-    void SetUp() override {
-        folder_ = std::filesystem::path(testing::TempDir()) / "kiln_sky";
-        std::filesystem::create_directories(folder_);
-    }
-    void TearDown() override { std::filesystem::remove_all(folder_); }
-
     void write(const std::string& name, int width, int height, const std::vector<float>& values) {
         const auto done = image::write_exr((folder_ / name).string(), width, height, 3, values);
         ASSERT_TRUE(done) << done.error().message;
@@ -43,7 +38,7 @@ protected:
     Result<World> world_with(const std::string& file, const std::string& more = "") {
         return World::parse(text_with(file, more), (folder_ / "s.json").string());
     }
-    std::filesystem::path folder_;
+    const TempFolder folder_;
 };
 
 Frame frame_of(const std::string& more) {

@@ -3,6 +3,7 @@
 
 #include "image/png_file.h"
 #include "scene_text.h"
+#include "temp_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -187,7 +188,8 @@ TEST(World, MaterialsBlendTheirNumbersRight) {
 }
 
 TEST(World, HeightfieldsReadTheirImage) {
-    const std::string folder = testing::TempDir();
+    const TempFolder made;
+    const std::string folder = made.string();
     const image::Pixels ramp{.width = 2, .height = 2, .channels = 1, .bits = 16, .values = {0, 65535, 0, 65535}};
     ASSERT_TRUE(image::write_png(folder + "/ramp.png", ramp));
     std::ofstream(folder + "/ramp.kiln.json")
@@ -212,7 +214,8 @@ constexpr const char* kCube =
     "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
 
 TEST(World, MeshesAreShapesAmongOthers) {
-    const std::string folder = testing::TempDir();
+    const TempFolder made;
+    const std::string folder = made.string();
     std::ofstream(folder + "/cube.obj") << kCube;
     const std::string scene = folder + "/cube.kiln.json";
     std::ofstream(scene) << scene_with(
@@ -245,7 +248,8 @@ TEST(World, MeshesAreShapesAmongOthers) {
 }
 
 TEST(World, MeshesMayComeLaterAndBesideHeightfields) {
-    const std::string folder = testing::TempDir();
+    const TempFolder made;
+    const std::string folder = made.string();
     std::ofstream(folder + "/cube.obj") << kCube;
     const image::Pixels flat{
         .width = 3, .height = 3, .channels = 1, .bits = 8, .values = std::vector<uint16_t>(9, 255)};
@@ -278,7 +282,8 @@ TEST(World, MeshesMayComeLaterAndBesideHeightfields) {
 }
 
 TEST(World, MeshFaultsSayWhichFileAndWhere) {
-    const std::string folder = testing::TempDir(), scene = folder + "/m.kiln.json";
+    const TempFolder made;
+    const std::string folder = made.string(), scene = folder + "/m.kiln.json";
     std::ofstream(folder + "/sheet.obj") << "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     std::ofstream(folder + "/broken.obj") << "v 0 0 0\nf 1 2 3\n";
     const std::pair<const char*, const char*> files[] = {{"gone.obj", "gone.obj: cannot be read"},
@@ -306,7 +311,7 @@ TEST(World, MeshFaultsSayWhichFileAndWhere) {
 
 TEST(World, ImportMakesASceneThatNamesItsModel) {
     namespace fs = std::filesystem;
-    const fs::path folder = fs::path(testing::TempDir()) / "import";
+    const TempFolder folder;
     fs::create_directories(folder / "models");
     fs::create_directories(folder / "scenes");
     std::ofstream(folder / "models/cube.obj") << kCube;
@@ -329,11 +334,11 @@ TEST(World, ImportMakesASceneThatNamesItsModel) {
     EXPECT_LT(tall->bounds().max.z, 0.5f);
     EXPECT_EQ(World::import("m.csg", scene).error().kind, ErrorKind::Usage);
     EXPECT_EQ(World::import((folder / "gone.obj").string(), scene).error().kind, ErrorKind::Input);
-    fs::remove_all(folder);
 }
 
 TEST(World, AModelIsReadOnceBesideItsSceneAndItsFaultsNameTheFile) {
-    const std::string folder = testing::TempDir();
+    const TempFolder made;
+    const std::string folder = made.string();
     std::ofstream(folder + "/ball.vm")
         << "_0 var-x\n_1 var-y\n_2 var-z\n_3 square _0\n_4 square _1\n_5 square _2\n_6 add _3 _4\n"
            "_7 add _6 _5\n_8 sqrt _7\n_9 const 1\n_a sub _8 _9\n";
