@@ -47,6 +47,7 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
+    if (!(o.time >= 0 && o.time <= 1e9)) return usage("--time wants seconds, 0 or more");
     if (!o.path.empty() && o.frames < 2) return usage("--path wants --frames, 2 or more");
     if (o.path.empty() && (o.frames != 0 || o.budget != 0))
         return usage("--frames and --budget work with --path; add it");
@@ -194,6 +195,7 @@ int render_sequence(const PictureOptions& o, const RenderSettings& settings, con
         const Stopwatch baking;
         auto frame = world.frame(along(*stops, double(i) / (o.frames - 1)), budget);
         if (!frame) return progress.stage(""), fail(frame.error());
+        frame->time = frame->time_before = o.time;
         const double bake_ms = 1000 * baking.seconds();
         auto picture = renderer->render(*frame, settings);
         if (!picture) return progress.stage(""), fail(picture.error());

@@ -92,6 +92,7 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"render potter -o a.png --frobnicate", "--help"},
         {"render potter -o a.png --path all", "--frames"},
         {"render potter -o a.png --frames 9", "--path"},
+        {"render potter -o a.png --time -1", "0 or more"},
         {"render potter -o a.png --path all --frames 2 --camera main", "leave --camera"},
         {"render potter -o a.png --path main,maim --frames 2 --size 8x8", "did you mean \"main\"?"},
         {"render potter -o a.png --path main --frames 2 --size 8x8", "two cameras"},
