@@ -192,6 +192,7 @@ TEST_F(MeshGpu, PicturesAreThoseOfTheJudge) {
     w.edits.push_back(field::worlds::edit(Box{.half_extents = {1.3f, 0.1f, 1.3f}}, {0, -0.8f, 0}));
     Frame frame = frame_with(w);
     frame.meshes.push_back(meshes::at(meshes::sphere(0.4f, 24, meshes::of_material(kClay)), {0.75f, -0.2f, 0.4f}));
+    frame.meshes.back().transform.scale = {0.9f, 0.5f, 1.3f};
     frame.meshes.push_back(meshes::at(meshes::sheet(-0.6f, -0.6f, 0.6f, 0.6f, meshes::matte({0.2f, 0.5f, 0.3f})),
                                       {-0.7f, -0.6f, 0.3f}, axis_angle({0, 0, 1}, 0.2f)));
     frame.lights = {
@@ -298,6 +299,42 @@ TEST_F(MeshGpu, HolesOfAMaskShowWhatIsBehindAndLetLightThrough) {
     EXPECT_NEAR(backed.depth[at(backed, 0.42, 0.42)], 2.5f, 0.1f);
     EXPECT_NEAR(backed.depth[at(backed, 0.55, 0.44)], 3.0f, 0.1f);
     EXPECT_GT(backed.rgba[4 * at(backed, 0.55, 0.44)], 0.1f) << "lit through the hole";
+}
+
+// A skinned strip whose upper joint turns a quarter: half of it lies down, with its normals.
+TEST(MeshSet, SkinsFollowTheirJoints) {
+    auto strip = std::make_shared<model::Drawable>(*meshes::sheet(-0.1f, 0, 0.1f, 1, meshes::matte({1, 1, 1})));
+    strip->primitives[0].first_weights = 0;
+    for (const model::Vertex& v : strip->vertices) {
+        model::SkinWeights w;
+        w.joints = {0, 1, 0, 0};
+        w.weights = {1 - v.position.z, v.position.z, 0, 0};
+        strip->weights.push_back(w);
+    }
+    const double h = std::sqrt(0.5);
+    strip->nodes[0].skin = 0;
+    strip->nodes[0].translation = {5, 5, 5};  // a skinned node's own place does not count
+    strip->nodes.emplace_back();
+    strip->nodes.emplace_back().rotation = {-h, 0, 0, h};  // z goes to +y
+    strip->skins.push_back({{1, 2}, {model::kIdentity, model::kIdentity}});
+    Frame frame;
+    frame.meshes.push_back(meshes::at(strip, {0, 0, 10}));
+    const MeshSet set = make_mesh_set(frame);
+    ASSERT_EQ(set.parts.size(), 1u);
+    ASSERT_EQ(set.moved.size(), 4u);
+    for (size_t i = 0; i < 4; ++i) {
+        const model::Vertex &was = strip->vertices[i], &is = set.moved[i];
+        EXPECT_NEAR(is.position.x, was.position.x, 1e-6);
+        EXPECT_NEAR(is.position.y, was.position.z, 1e-6);
+        EXPECT_NEAR(is.position.z, 0, 1e-6);
+        EXPECT_NEAR(is.normal.z, was.position.z > 0.5f ? -1 : 0, 1e-6);
+        EXPECT_NEAR(is.normal.y, was.position.z > 0.5f ? 0 : 1, 1e-6);
+    }
+    const auto hit = MeshTrace(set).hit({0, 0.5, 20}, {0, 0, -1}, 100);
+    EXPECT_FALSE(hit) << "its front looks the other way";
+    const auto front = MeshTrace(set).hit({0, 0.5, 0}, {0, 0, 1}, 100);
+    ASSERT_TRUE(front);
+    EXPECT_NEAR(front->t, 10, 1e-6);
 }
 
 // What the camera turns away from is not drawn, and nothing that it sees is lost.

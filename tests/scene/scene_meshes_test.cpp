@@ -20,9 +20,10 @@ constexpr std::string_view kTetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf
 World load(const TempFolder& folder, const std::string& meshes) {
     std::ofstream(folder / "tet.obj") << kTetrahedron;
     std::ofstream(folder / "broken.glb") << "glTF and no more";
-    std::ofstream(folder / "s.kiln.json") << "{\"format\":1,\"materials\":{\"red\":{\"base_color\":[0.9,0.1,0.1],\"roughness\":0.2}},"
-                                            "\"edits\":[{\"shape\":\"sphere\"}],\n\"meshes\":["
-                                         << meshes << "]}";
+    std::ofstream(folder / "s.kiln.json")
+        << "{\"format\":1,\"materials\":{\"red\":{\"base_color\":[0.9,0.1,0.1],\"roughness\":0.2}},"
+           "\"edits\":[{\"shape\":\"sphere\"}],\n\"meshes\":["
+        << meshes << "]}";
     auto world = World::load((folder / "s.kiln.json").string());
     EXPECT_TRUE(world) << (world ? "" : world.error().message);
     return std::move(*world);
@@ -30,8 +31,10 @@ World load(const TempFolder& folder, const std::string& meshes) {
 
 TEST(SceneMeshes, AFrameHoldsThemWhereTheSceneHasThem) {
     const TempFolder folder;
-    const World world = load(folder, "{\"id\":\"a\",\"file\":\"tet.obj\",\"position\":[1,2,3],\"scale\":2,\"material\":\"red\"},"
-                                     "{\"id\":\"b\",\"file\":\"tet.obj\"},{\"id\":\"c\",\"file\":\"tet.obj\",\"hidden\":true}");
+    const World world =
+        load(folder,
+             "{\"id\":\"a\",\"file\":\"tet.obj\",\"position\":[1,2,3],\"scale\":2,\"material\":\"red\"},"
+             "{\"id\":\"b\",\"file\":\"tet.obj\"},{\"id\":\"c\",\"file\":\"tet.obj\",\"hidden\":true}");
     EXPECT_TRUE(world.faults().empty());
     const auto frame = world.frame();
     ASSERT_TRUE(frame);
@@ -49,8 +52,9 @@ TEST(SceneMeshes, AFrameHoldsThemWhereTheSceneHasThem) {
 
 TEST(SceneMeshes, OneThatCannotBeReadIsAnErrorWithItsPlaceAndTheRestIsDrawn) {
     const TempFolder folder;
-    const World world = load(folder, "{\"id\":\"a\",\"file\":\"none.glb\"},{\"id\":\"b\",\"file\":\"tet.obj\"},\n"
-                                     "{\"id\":\"c\",\"file\":\"broken.glb\"}");
+    const World world = load(folder,
+                             "{\"id\":\"a\",\"file\":\"none.glb\"},{\"id\":\"b\",\"file\":\"tet.obj\"},\n"
+                             "{\"id\":\"c\",\"file\":\"broken.glb\"}");
     ASSERT_EQ(world.faults().size(), 2u);
     EXPECT_THAT(world.faults()[0], HasSubstr("s.kiln.json:2:28: meshes[0].file: "));
     EXPECT_THAT(world.faults()[0], HasSubstr("none.glb: cannot be read"));
@@ -63,8 +67,8 @@ TEST(SceneMeshes, OneThatCannotBeReadIsAnErrorWithItsPlaceAndTheRestIsDrawn) {
 
 TEST(SceneMeshes, AMaterialThatIsNotThereIsRefused) {
     const TempFolder folder;
-    std::ofstream(folder / "s.kiln.json")
-        << "{\"format\":1,\"materials\":{\"red\":{}},\"meshes\":[{\"id\":\"a\",\"file\":\"x.glb\",\"material\":\"rod\"}]}";
+    std::ofstream(folder / "s.kiln.json") << "{\"format\":1,\"materials\":{\"red\":{}},\"meshes\":[{\"id\":\"a\","
+                                             "\"file\":\"x.glb\",\"material\":\"rod\"}]}";
     const auto world = World::load((folder / "s.kiln.json").string());
     ASSERT_FALSE(world);
     EXPECT_THAT(world.error().message, HasSubstr("meshes[0].material: "));
