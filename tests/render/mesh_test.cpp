@@ -150,7 +150,8 @@ double disc_beyond(double x) {
 TEST_F(MeshGpu, SoftShadowsAreTheVisibleShareOfTheDisc) {
     const float height = 0.6f, diameter_deg = 20;
     const double radius = std::tan(0.5 * double(diameter_deg) * std::numbers::pi / 180);
-    for (const bool floor_is_mesh : {false, true}) {
+    for (int quarter = 0; quarter < 4; ++quarter) {
+        const bool floor_is_mesh = quarter % 2 == 1;
         field::worlds::World w = speck();
         w.options.bounds = Box3{{-1.5f, -0.5f, -1.5f}, {1.5f, 0.5f, 1.5f}};
         w.edits = {field::worlds::edit(Box{.half_extents = {1.2f, 0.1f, 1.2f}}, {0, floor_is_mesh ? -0.3f : -0.1f, 0})};
@@ -164,25 +165,28 @@ TEST_F(MeshGpu, SoftShadowsAreTheVisibleShareOfTheDisc) {
             open.meshes.push_back(
                 meshes::at(meshes::sheet(-1.2f, -1.2f, 1.2f, 1.2f, meshes::matte({0.5f, 0.5f, 0.5f}))));
         Frame shaded = open;
+        // It hides the half-space towards `hidden`.
+        const quat turned = axis_angle({0, 1, 0}, 0.5f * std::numbers::pi_v<float> * float(quarter));
+        const vec3 hidden = rotate(turned, {-1, 0, 0});
         shaded.meshes.push_back(
-            meshes::at(meshes::sheet(-40, -20, 0, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {0, height, 0}));
-        const Picture a = picture(open), b = picture(shaded);
+            meshes::at(meshes::sheet(-40, -20, 0, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {0, height, 0}, turned));
+        const Picture a = picture(open, View::Shaded, 96, 72), b = picture(shaded, View::Shaded, 96, 72);
         const shade::CameraParams eye = shade::camera_params(open.camera, a.width, a.height);
         double worst = 0;
         int judged = 0;
-        for (int y = 10; y < a.height - 10; ++y) {
+        for (int y = 6; y < a.height - 6; ++y) {
             for (int x = 0; x < a.width; ++x) {
                 const size_t i = size_t(y * a.width + x);
                 if (!(a.rgba[4 * i] > 0.02f)) continue;
                 const vec3 d = shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f);
-                const double at = double(open.camera.position.x) + double(d.x) * double(a.depth[i]);
+                const double at = -double(dot(hidden, open.camera.position + d * a.depth[i]));
                 const double seen = double(b.rgba[4 * i]) / double(a.rgba[4 * i]);
                 worst = std::max(worst, std::fabs(seen - disc_beyond(-at / (double(height) * radius))));
                 ++judged;
             }
         }
-        EXPECT_GT(judged, 10000);
-        EXPECT_LE(worst, 0.022) << (floor_is_mesh ? "on a mesh" : "on the field");
+        EXPECT_GT(judged, 3000);
+        EXPECT_LE(worst, 0.022) << (floor_is_mesh ? "on a mesh, " : "on the field, ") << quarter;
     }
 }
 
@@ -377,21 +381,60 @@ TEST_F(MeshGpu, OnlyPartsOutOfSightAreNotDrawn) {
 }
 
 TEST_F(MeshGpu, TilesOfALargePictureJoin) {
-    // 4100 pixels are two tiles.
+    // 4100 pixels are two tiles, and the right half of the picture looks far to the right.
     Frame frame = frame_with(speck());
-    frame.meshes.push_back(meshes::at(meshes::sphere(1, 96, meshes::of_material(kClay))));
+    frame.meshes.push_back(meshes::at(meshes::sphere(3, 256, meshes::of_material(kClay)), {10, 0, 0}));
+    frame.camera.position = {0, 0, 0};
+    frame.camera.target = {0, 0, -1};
     const Picture p = rhi::must(renderer->render(frame, {.width = 4100, .height = 8, .view = View::Depth}));
     const shade::CameraParams eye = shade::camera_params(frame.camera, p.width, p.height);
-    const dvec3 o{frame.camera.position.x, frame.camera.position.y, frame.camera.position.z};
     int hits = 0;
     for (int x = 0; x < p.width; ++x) {
         const vec3 d = shade::camera_direction_at(eye, float(x) + 0.5f, 4.5f);
-        const double t = sphere_hit(o, {d.x, d.y, d.z}, {0, 0, 0}, 0.995);
-        if (std::isinf(t)) continue;
+        const double t = sphere_hit({0, 0, 0}, {d.x, d.y, d.z}, {10, 0, 0}, 2.99);
+        if (std::isinf(t) || t < 0) continue;
         ++hits;
-        EXPECT_NEAR(double(p.depth[size_t(4 * p.width + x)]), t, 0.06) << x;
+        EXPECT_NEAR(double(p.depth[size_t(4 * p.width + x)]), t, 0.2) << x;
     }
-    EXPECT_GE(hits, 6);
+    EXPECT_GT(hits, 1900);
+}
+
+// A box of triangles just inside a box of the field: bricks round the edges of the field's, and yet nothing shows through, for what meets is
+// what was refined.
+TEST_F(MeshGpu, NothingInsideShowsThroughRoundedEdges) {
+    field::worlds::World w = speck();
+    w.options.voxel_size = 0.1f;
+    w.edits = {field::worlds::edit(Box{.half_extents = {0.53f, 0.53f, 0.53f}})};
+    Frame frame = frame_with(w);
+    for (Material& m : frame.materials) m.base_color = {0.8f, 0, 0};
+    frame.camera.position = {1.3f, 1.1f, 1.7f};
+    model::Surface blue = meshes::matte({0, 0, 0.8f});
+    blue.double_sided = true;
+    std::vector<model::Vertex> v(8);
+    for (size_t i = 0; i < 8; ++i)
+        v[i].position = {i & 1 ? 0.526f : -0.526f, i & 2 ? 0.526f : -0.526f, i & 4 ? 0.526f : -0.526f};
+    frame.meshes.push_back(meshes::at(meshes::of_surface(
+        std::move(v),
+        {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4, 2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5},
+        blue)));
+    const Picture p = picture(frame, View::Albedo);
+    // At the rim rays miss the rounded field altogether.
+    const auto at_rim = [&](int x, int y) {
+        for (int j = std::max(y - 3, 0); j <= std::min(y + 3, p.height - 1); ++j)
+            for (int i = std::max(x - 3, 0); i <= std::min(x + 3, p.width - 1); ++i)
+                if (std::isinf(p.depth[size_t(j * p.width + i)])) return true;
+        return false;
+    };
+    int red = 0, through = 0;
+    for (int y = 0; y < p.height; ++y) {
+        for (int x = 0; x < p.width; ++x) {
+            const float* c = &p.rgba[4 * size_t(y * p.width + x)];
+            red += c[0] > 0.4f;
+            through += c[2] > 0.4f && !at_rim(x, y);
+        }
+    }
+    EXPECT_GT(red, 1000);
+    EXPECT_EQ(through, 0);
 }
 
 }  // namespace

@@ -42,6 +42,8 @@ layout(push_constant) uniform Push { ShadowPush push; };
 const uint kChords = 32u;
 const float kChordPlaces[16] = float[16](0.024546, 0.073698, 0.123030, 0.172668, 0.222749, 0.273427, 0.324877, 0.377309, 0.430984, 0.486234, 0.543509, 0.603449, 0.667038, 0.735969, 0.813746, 0.911369);  // of the upper half: where (i + 0.5) / 32 of the disc is below
 
+const float kFarMetres = 1e7;  // meshes are nearer; squares of it are floats
+
 // All rays from a point to a light's disc: along + x across + y up, x² + y² <= 1; a ray's parameter counts metres along its middle.
 struct Cone {
     vec3 from;
@@ -276,7 +278,7 @@ void main() {
             if (index >= frame.light_count) break;
             if (fractions[channel] <= 0.0) continue;
             LightSample light = sample_light(lights[index], p_world);
-            fractions[channel] *= unhidden(from, light.l, light.tan_radius, light.distance);
+            fractions[channel] *= unhidden(from, light.l, light.tan_radius, min(light.distance, kFarMetres));
         }
     }
     imageStore(visible_fractions, pixel, fractions);
