@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// A program's own shape: its distance in C++, its numbers as parameters, used like any other shape in code and in scene files.
+// A program's own shape: its distance in C++ (`glsl` takes one in GLSL), its numbers as parameters, used like any other shape in code and in scene files.
 
 #include <kiln/edit.h>
 #include <kiln/world.h>

@@ -55,8 +55,9 @@ struct Shape {
     friend bool operator==(const Shape&, const Shape&) = default;
 };
 
-/// A shape of the program's own: a distance in C++, known by name in code and in scene files.
-///   const auto egg = kiln::register_shape({.name = "egg", .distance = …, .half_extents = …});
+/// A shape of the program's own, known by name in code and in scene files: a distance in GLSL, which every device and every instruction
+/// set runs, or in C++.
+///   const auto egg = kiln::register_shape({.name = "egg", .half_extents = …, .glsl = "float egg(vec3 p) { … }"});
 ///   world.add({.node = {.shape = *egg}});
 struct CustomShape {
     /// One number of the shape; a key beside `shape` in scene files.
@@ -84,10 +85,14 @@ struct CustomShape {
     /// No two points of the box differ by more than this per metre; 1 for distances. What is given here and above is checked by
     /// sampling when an edit with the shape is compiled; the solid is cut to the box.
     float lipschitz = 1;
+    /// In the place of `distance`: a function of the point, and of a float for each parameter in order; the last function in the text
+    /// that takes a vec3 first and returns a float. What is read of GLSL: docs/scene-format.md.
+    std::string glsl{};
 };
 
 /// Makes the shape known to this process, for good, and returns one with its parameters' own values. Register before worlds or scene
-/// files name it. Worlds with it are baked on the CPU on every device. Fails on a name that is taken or a missing function. Any thread.
+/// files name it. Worlds with one in C++ are baked on the CPU on every device. Fails on a name that is taken, a missing function, and GLSL that
+/// cannot be read ("glsl LINE:COLUMN: …"). Any thread.
 Result<Shape> register_shape(CustomShape shape);
 
 /// One entry of a modelling stack (twist, bend, mirror, round, …); same layout as Shape.

@@ -87,7 +87,8 @@ Fault check_node(const Node& node, size_t objects, size_t materials) {
         if (row.how == sdf::KindRow::Sampled && node.shape.data.empty())
             return fault(formatted("shape: a {} needs a file in `data`", row.name));
         if (row.how == sdf::KindRow::Formula && node.shape.data.starts_with(sdf::kModelText))
-            return fault("shape: an expression holds its formula or the name of a model, \"file:NAME.vm\"");
+            return fault(
+                "shape: an expression holds its formula or the name of a model, \"file:NAME.vm\", \"file:NAME.glsl\"");
     } else if (node.kind == Node::Kind::Object && node.object.index >= objects) {
         return fault("object: there is no such object; add it first");
     }

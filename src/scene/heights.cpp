@@ -111,7 +111,7 @@ Result<GridSource> with_grids(std::span<const Edit> edits, const std::vector<Obj
                 }
                 model = grids.models.emplace(name, std::move(*text)).first;
             }
-            node.shape.data = std::string(sdf::kModelText) + model->second;
+            node.shape.data = (name.ends_with(".vm") ? std::string(sdf::kModelText) : std::string()) + model->second;
             return {};
         }
         auto found = grids.by_file.find(node.shape.data);

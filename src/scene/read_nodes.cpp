@@ -83,9 +83,9 @@ bool NodeReader::shape(JsonIndex at, JsonIndex name, Node& out) {
     if (row.how == sdf::KindRow::Formula) {
         const auto text = in_.doc.find(at, "expression"), file = in_.doc.find(at, "file");
         if (!text && !file)
-            return in_.fail(
-                at,
-                "an expression needs its formula; add \"expression\": \"length(p) - 1\", or \"file\" with a .vm model");
+            return in_.fail(at,
+                            "an expression needs its formula; add \"expression\": \"length(p) - 1\", or \"file\" with "
+                            "a .vm model or a .glsl function");
         if (text && file) return in_.fail_at_key(*file, "\"expression\" and \"file\" in one place; keep one of them");
     }
     return true;
@@ -166,8 +166,9 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit, bool partly) {
             if (shape_row->how == sdf::KindRow::Formula && (key == "expression" || key == "file")) {
                 const bool file = key == "file";
                 if (!in_.text(m, file ? "model.vm" : "length(p) - 1", &out.shape.data)) return false;
-                if (file && !out.shape.data.ends_with(".vm"))
-                    return in_.fail(m, "not the name of a .vm model; name one, relative to the scene file");
+                if (file && !out.shape.data.ends_with(".vm") && !out.shape.data.ends_with(".glsl"))
+                    return in_.fail(
+                        m, "not the name of a .vm model or of a .glsl function; name one, relative to the scene file");
                 if (file) out.shape.data = std::string(sdf::kModelFile) + out.shape.data;
                 continue;
             }

@@ -214,8 +214,9 @@ Json nodes_of(const Table& table) {
         }
         if (row.how == sdf::KindRow::Formula) {
             properties["expression"] = {{"type", "string"}, {"description", "the formula; or `file`"}};
-            properties["file"] = {{"type", "string"},
-                                  {"description", ".vm model, relative to the scene file; or `expression`"}};
+            properties["file"] = {
+                {"type", "string"},
+                {"description", ".vm model or .glsl function, relative to the scene file; or `expression`"}};
         }
         properties.update(common(false));
         add(row.doc, std::move(properties), std::move(required));

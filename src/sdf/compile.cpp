@@ -369,10 +369,16 @@ private:
             return add_boxed(task, formula, prepared.lipschitz, {});
         }
         if (shape_rows()[shape.kind].how == KindRow::Custom) {
+            const Result<CustomBounds> checked = check_custom(shape);
             Binary custom;
+            if (checked->formula) {
+                own_formulas_.push_back(checked->formula);
+                custom.source = checked->formula.get();
+                return add_boxed(task, custom, checked->lipschitz, {});
+            }
             custom.opcode = Opcode::Custom;
             custom.aux = custom_index(shape.kind);
-            return add_boxed(task, custom, check_custom(shape)->lipschitz, shape.params);
+            return add_boxed(task, custom, checked->lipschitz, shape.params);
         }
         const std::array<float, kMaxParams> params = resolved_.params_of(shape);
         Binary leaf;
@@ -511,6 +517,7 @@ private:
     uint16_t material_ = uint16_t(kNoMaterial);  // of the edit's leaves so far
     uint32_t params_first_ = 0;                  // where params_ will lie in the program
     std::vector<float> params_;
+    std::vector<std::shared_ptr<const Formula>> own_formulas_;  // of the program's own shapes, while they are compiled
     std::vector<Instruction> code_;
     std::vector<Binary> nodes_;
     std::map<const Formula*, FormulaCode> formulas_;

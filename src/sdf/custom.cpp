@@ -4,6 +4,7 @@
 #include "sdf/custom.h"
 
 #include "sdf/eval_isa.h"
+#include "sdf/expression_glsl.h"
 
 #include "base/format.h"
 
@@ -55,6 +56,11 @@ Result<CustomBounds> sampled(const Shape& shape) {
     CustomBounds out;
     out.half_extents = custom.half_extents(shape.params.data());
     out.lipschitz = custom.lipschitz;
+    if (!custom.glsl.empty()) {
+        auto formula = read_glsl(custom.glsl, std::span(shape.params).first(custom.parameters.size()));
+        if (!formula) return fail("glsl " + formula.error().message);
+        out.formula = std::make_shared<const Formula>(std::move(*formula));
+    }
     const double half[3] = {double(out.half_extents.x), double(out.half_extents.y), double(out.half_extents.z)};
     for (const double h : half)
         if (!(h > 0 && h < 1e9)) return fail("half_extents gives no size; it must be above 0 and finite on every axis");
@@ -72,7 +78,11 @@ Result<CustomBounds> sampled(const Shape& shape) {
         for (int k = 0; k < 3; ++k) q[k] = std::clamp(p[k] + step * half[k] * in(), -half[k], half[k]);
         const double x[2] = {p[0], q[0]}, y[2] = {p[1], q[1]}, z[2] = {p[2], q[2]};
         double d[2];
-        custom_distances(index, shape.params.data(), {x, y, z, 2}, d);
+        if (out.formula) {
+            for (int k = 0; k < 2; ++k) d[k] = evaluate(*out.formula, {x[k], y[k], z[k]});
+        } else {
+            custom_distances(index, shape.params.data(), {x, y, z, 2}, d);
+        }
         if (!std::isfinite(d[0]))
             return fail(formatted("its distance at {} is not a finite number; make it one everywhere in half_extents",
                                   point_text(p)));
@@ -137,7 +147,8 @@ Result<Shape> register_shape(CustomShape shape) {
         return Error{"register shape \"" + shape.name + "\": " + std::move(what), ErrorKind::Usage};
     };
     if (!is_name(shape.name)) return fail("no name; use lower case letters, digits and _, a letter first");
-    if (!shape.distance) return fail("no distance; give it a function");
+    if (shape.distance && !shape.glsl.empty()) return fail("a distance in C++ and one in GLSL; keep one of them");
+    if (!shape.distance && shape.glsl.empty()) return fail("no distance; give it a function, or GLSL");
     if (!shape.half_extents) return fail("no half_extents; give it a function");
     if (!(shape.lipschitz > 0 && shape.lipschitz < 1e6f)) return fail("lipschitz is no slope; use 1 for a distance");
     auto made = std::make_unique<Registered>();
@@ -156,6 +167,10 @@ Result<Shape> register_shape(CustomShape shape) {
             return fail("the value of \"" + p.name + "\" is out of its range");
         out.params[i] = p.value;
         made->ranges.push_back(formatted("[{}, {}]", p.least, p.most));
+    }
+    if (!shape.glsl.empty()) {
+        const auto formula = read_glsl(shape.glsl, std::span(out.params).first(shape.parameters.size()));
+        if (!formula) return fail("glsl " + formula.error().message);
     }
     made->shape = std::move(shape);
 

@@ -412,15 +412,7 @@ private:
         return true;
     }
 
-    uint32_t dot(const Value& a, const Value& b) {
-        uint32_t sum = build_.binary(Fn::Mul, a.at[0], b.at[0]);
-        for (size_t i = 1; i < size_t(a.size); ++i)
-            sum = build_.binary(Fn::Add, sum, build_.binary(Fn::Mul, a.at[i], b.at[i]));
-        return sum;
-    }
-    uint32_t length(const Value& v) {
-        return v.size == 1 ? build_.unary(Fn::Abs, v.at[0]) : build_.unary(Fn::Sqrt, dot(v, v));
-    }
+    static std::span<const uint32_t> parts(const Value& v) { return {v.at.data(), size_t(v.size)}; }
 
     bool call(const Pending& open) {
         const Function& f = *open.function;
@@ -465,7 +457,7 @@ private:
                 to = b.round(u);
                 break;
             case Call::Fract:
-                to = b.binary(Fn::Sub, u, b.unary(Fn::Floor, u));
+                to = b.fract(u);
                 break;
             case Call::Tan:
                 to = b.tan(u);
@@ -483,17 +475,14 @@ private:
                 to = b.power(u, v);
                 break;
             case Call::Clamp:
-                to = b.binary(Fn::Min, b.binary(Fn::Max, u, v), w);
+                to = b.clamp(u, v, w);
                 break;
             case Call::Mix:
-                to = b.binary(Fn::Add, u, b.binary(Fn::Mul, b.binary(Fn::Sub, v, u), w));
+                to = b.mix(u, v, w);
                 break;
-            case Call::Smoothstep: {
-                const uint32_t share = b.binary(Fn::Div, b.binary(Fn::Sub, w, u), b.binary(Fn::Sub, v, u));
-                const uint32_t t = b.binary(Fn::Min, b.binary(Fn::Max, share, k(0)), k(1));
-                to = b.binary(Fn::Mul, b.unary(Fn::Square, t), b.binary(Fn::Sub, k(3), b.binary(Fn::Mul, k(2), t)));
+            case Call::Smoothstep:
+                to = b.smoothstep(u, v, w);
                 break;
-            }
             default: {  // the smooth kernel of the operations
                 const bool least = f.call == Call::SmoothMin;
                 const uint32_t gap = b.unary(Fn::Abs, b.binary(Fn::Sub, u, v));
@@ -516,17 +505,17 @@ private:
             }
             break;
         case Call::Length:
-            out = {1, {length(in[0])}, place};
+            out = {1, {b.length(parts(in[0]))}, place};
             break;
         case Call::Distance:
         case Call::Dot:
             if (!match(in[0], in[1], place)) return false;
             if (f.call == Call::Dot) {
-                out = {1, {dot(in[0], in[1])}, place};
+                out = {1, {b.dot(parts(in[0]), parts(in[1]))}, place};
             } else {
                 for (size_t i = 0; i < size_t(in[0].size); ++i)
                     in[0].at[i] = b.binary(Fn::Sub, in[0].at[i], in[1].at[i]);
-                out = {1, {length(in[0])}, place};
+                out = {1, {b.length(parts(in[0]))}, place};
             }
             break;
         case Call::Cross: {
@@ -540,7 +529,7 @@ private:
             break;
         }
         case Call::Normalize: {
-            const uint32_t size = length(in[0]);
+            const uint32_t size = b.length(parts(in[0]));
             for (size_t i = 0; i < size_t(out.size); ++i) out.at[i] = b.binary(Fn::Div, in[0].at[i], size);
             break;
         }

@@ -2,7 +2,7 @@
 // Formulas: what the shape `expression` is written in, as text or as a line-per-operation `.vm` model, compiled to one graph of
 // numbers of the local point. Equal subexpressions are one node, constants are folded, every node is used.
 //
-// Text:   statements `name = value;`, then one value: the distance.
+// Text, or GLSL where it has braces (expression_glsl.h):   statements `name = value;`, then one value: the distance.
 //   numbers  x y z p pi, names given before;  + - * /  unary -  ^ (right, before unary minus)  ( )  .x .y .z and swizzles (p.xz)
 //   of each component:  abs sqrt square sin cos tan asin acos atan exp log ln floor ceil round fract;  min max (two or more),
 //   mod(a, b) (sign of b), pow, atan2(y, x), clamp(v, low, high), mix(a, b, t), smoothstep(low, high, v), smin(a, b, k), smax(a, b, k)

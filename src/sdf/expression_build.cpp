@@ -137,6 +137,17 @@ uint32_t Builder::acos(uint32_t a) {
     return binary(Fn::Atan2, unary(Fn::Sqrt, binary(Fn::Sub, constant(1), unary(Fn::Square, a))), a);
 }
 
+uint32_t Builder::smoothstep(uint32_t low, uint32_t high, uint32_t v) {
+    const uint32_t share = binary(Fn::Div, binary(Fn::Sub, v, low), binary(Fn::Sub, high, low));
+    const uint32_t t = clamp(share, constant(0), constant(1));
+    return binary(Fn::Mul, unary(Fn::Square, t), binary(Fn::Sub, constant(3), binary(Fn::Mul, constant(2), t)));
+}
+uint32_t Builder::dot(std::span<const uint32_t> a, std::span<const uint32_t> b) {
+    uint32_t sum = binary(Fn::Mul, a[0], b[0]);
+    for (size_t i = 1; i < a.size(); ++i) sum = binary(Fn::Add, sum, binary(Fn::Mul, a[i], b[i]));
+    return sum;
+}
+
 Formula Builder::finish(uint32_t value) const {
     // How many registers each node would want if it were a tree (Sethi and Ullman): the greedier operand goes first.
     std::vector<uint8_t> want(nodes_.size(), 1);

@@ -4,6 +4,8 @@
 
 #include "sdf/expression.h"
 
+#include <optional>
+#include <span>
 #include <string>
 #include <unordered_map>
 
@@ -27,7 +29,21 @@ public:
     uint32_t tan(uint32_t a);
     uint32_t asin(uint32_t a);
     uint32_t acos(uint32_t a);
+    uint32_t fract(uint32_t a) { return binary(Fn::Sub, a, unary(Fn::Floor, a)); }
+    uint32_t clamp(uint32_t v, uint32_t low, uint32_t high) { return binary(Fn::Min, binary(Fn::Max, v, low), high); }
+    uint32_t mix(uint32_t a, uint32_t b, uint32_t t) {
+        return binary(Fn::Add, a, binary(Fn::Mul, binary(Fn::Sub, b, a), t));
+    }
+    uint32_t smoothstep(uint32_t low, uint32_t high, uint32_t v);
+    uint32_t dot(std::span<const uint32_t> a, std::span<const uint32_t> b);
+    uint32_t length(std::span<const uint32_t> v) {
+        return v.size() == 1 ? unary(Fn::Abs, v[0]) : unary(Fn::Sqrt, dot(v, v));
+    }
 
+    /// The number that a node is, if it is one.
+    std::optional<double> number_of(uint32_t n) const {
+        return is_constant(n) ? std::optional(number(n)) : std::nullopt;
+    }
     bool full() const { return full_; }
     bool not_finite() const { return not_finite_; }  ///< some constant came to NaN or beyond kLargestConstant
     /// The graph of what `value` needs, in an order that keeps few numbers alive.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 
 #include "sdf/expression_code.h"
+#include "sdf/expression_glsl.h"
 
 #include "base/format.h"
 
@@ -173,8 +174,11 @@ using Prepared = Result<std::shared_ptr<const PreparedFormula>>;
 Prepared prepare(const std::string& data, vec3 half_extents, float declared) {
     const bool model = data.starts_with(kModelText);
     if (data.starts_with(kModelFile)) return Error{"refers to a file that was not loaded", ErrorKind::Input};
-    auto formula = model ? read_vm(std::string_view(data).substr(kModelText.size())) : parse_formula(data);
-    const std::string_view what = model ? "model " : "expression ";
+    const bool glsl = !model && is_glsl(data);
+    auto formula = model  ? read_vm(std::string_view(data).substr(kModelText.size()))
+                   : glsl ? read_glsl(data)
+                          : parse_formula(data);
+    const std::string_view what = model ? "model " : glsl ? "GLSL " : "expression ";
     if (!formula) return Error{std::string(what) + formula.error().message, ErrorKind::Input};
     auto lipschitz = formula_lipschitz(*formula, half_extents, declared);
     if (!lipschitz) return lipschitz.error();

@@ -32,7 +32,8 @@ struct PreparedFormula {
     float lipschitz = 1;  ///< proven, or declared and not refuted, over the half extents
 };
 
-/// Shape::data of an expression: its text, or one of these and a `.vm` model's text or file name.
+/// Shape::data of an expression: its text (a formula or GLSL), or the first of these and a `.vm` model's text, or the second and the name of
+/// a file with a model or GLSL.
 inline constexpr std::string_view kModelText = "vm:", kModelFile = "file:";
 
 /// Reads the formula and bounds its slope. Answers are kept for the whole process: the same formula is prepared once. Any thread.

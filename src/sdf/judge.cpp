@@ -185,11 +185,16 @@ double Judge::distance(dvec3 p_world) const {
             } else if (shape_rows()[node.shape.kind].how == KindRow::Custom) {
                 const Box3 box = shape_bounds(node.shape);
                 const real3 q = clamp(f.p, to_real3(box.min), to_real3(box.max));
+                const Result<CustomBounds> custom = check_custom(node.shape);
                 double value = 0;
-                custom_distances(custom_index(node.shape.kind), node.shape.params.data(), {&q.x, &q.y, &q.z, 1},
-                                 &value);
+                if (custom->formula) {
+                    value = evaluate(*custom->formula, {q.x, q.y, q.z});
+                } else {
+                    custom_distances(custom_index(node.shape.kind), node.shape.params.data(), {&q.x, &q.y, &q.z, 1},
+                                     &value);
+                }
                 const double known = std::fabs(value) < double(kEmpty) ? value : double(kEmpty);
-                answer = std::max(known / double(check_custom(node.shape)->lipschitz), box_distance(f.p, box));
+                answer = std::max(known / double(custom->lipschitz), box_distance(f.p, box));
                 stack.pop_back();
             } else {
                 const std::array<float, kMaxParams> params = r.params_of(node.shape);

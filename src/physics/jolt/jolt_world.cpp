@@ -236,7 +236,9 @@ protected:
             const std::lock_guard lock(mutex_);
             before.swap(touching_);
         }
+        step_begins();
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
+        step_ended();
         // Sleepers say nothing; they still touch what they touched.
         const BodyInterface& bodies_interface = system_.GetBodyInterfaceNoLock();
         const auto rests = [&](uint32_t i) { return objects_[i] && !bodies_interface.IsActive(objects_[i]->id); };
@@ -291,19 +293,21 @@ private:
         settings.mCombinedRestitution = s.restitution;
     }
     void OnContactAdded(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m, ContactSettings& s) override {
+        const CallInStep call;
         give_surface(a, b, m, s);
         note(a, b, m);
     }
     void OnContactPersisted(const JPH::Body& a, const JPH::Body& b, const ContactManifold& m,
                             ContactSettings& s) override {
+        const CallInStep call;
         give_surface(a, b, m, s);
         note(a, b, m);
     }
 
     Layers layers_;
     TempAllocatorImplWithMallocFallback scratch_;
-    std::unique_ptr<JobSystem> jobs_;
     PhysicsSystem system_;
+    std::unique_ptr<JobSystem> jobs_;  // its threads end before what they worked on
     std::vector<std::unique_ptr<Object>> objects_;
     mutable std::mutex mutex_;  // of touching_
     std::vector<Pair> touching_;

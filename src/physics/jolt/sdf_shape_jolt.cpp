@@ -73,6 +73,7 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
 void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
                     Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
                     const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+    const CallInStep call;
     static thread_local std::vector<FieldContact> contacts;
     const Pose world = world_of(field_of(shape2), transform2);
     collide(field_of(shape2).sdf().field(), convex_of(shape1), inverse(world) * pose_of(transform1),
@@ -83,6 +84,7 @@ void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
 void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
                     Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
                     const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+    const CallInStep call;
     static thread_local std::vector<FieldContact> contacts;
     const Pose world1 = world_of(field_of(shape1), transform1), world2 = world_of(field_of(shape2), transform2);
     collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance,
@@ -94,6 +96,7 @@ void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
 void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH::Shape* shape2, Vec3Arg,
           const ShapeFilter&, Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
           CastShapeCollector& collector) {
+    const CallInStep call;
     const bool field1 = moving.mShape->GetSubType() == kType;
     const Convex body = field1 ? Convex::sphere(field_of(moving.mShape).GetInnerRadius()) : convex_of(moving.mShape);
     const JoltSdfShape& field = field_of(shape2);
@@ -132,6 +135,7 @@ void JoltSdfShape::register_pairs() {
 }
 
 AABox JoltSdfShape::GetLocalBounds() const {
+    const CallInStep call;
     const Box3& box = sdf_->bounds();
     if (!box.finite()) return {Vec3::sReplicate(-kWorldSize), Vec3::sReplicate(kWorldSize)};
     return {to_jolt(box.min - center()), to_jolt(box.max - center())};
@@ -142,6 +146,7 @@ uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return 2 * kNormalBits; 
 const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
 
 Vec3 JoltSdfShape::GetSurfaceNormal(const SubShapeID&, Vec3Arg local) const {
+    const CallInStep call;
     vec3 n;
     (void)sdf_->field().distance(to_vec(local) + center(), n);
     return to_jolt(n).NormalizedOr(Vec3::sAxisY());
@@ -156,6 +161,7 @@ void JoltSdfShape::GetSubmergedVolume(Mat44Arg, Vec3Arg, const JPH::Plane&, floa
 }
 
 bool JoltSdfShape::CastRay(const RayCast& ray, const SubShapeIDCreator& id, RayCastResult& hit) const {
+    const CallInStep call;
     const auto found =
         cast_ray(sdf_->field(), to_vec(ray.mOrigin) + center(), to_vec(ray.mDirection), std::min(hit.mFraction, 1.0f));
     if (!found || found->fraction >= hit.mFraction) return false;
@@ -176,12 +182,14 @@ void JoltSdfShape::CastRay(const RayCast& ray, const RayCastSettings&, const Sub
 
 void JoltSdfShape::CollidePoint(Vec3Arg point, const SubShapeIDCreator& id, CollidePointCollector& collector,
                                 const ShapeFilter& filter) const {
+    const CallInStep call;
     if (filter.ShouldCollide(this, id.GetID()) && sdf_->field().distance(to_vec(point) + center()) <= 0)
         collector.AddHit({TransformedShape::sGetBodyID(collector.GetContext()), id.GetID()});
 }
 
 void JoltSdfShape::CollideSoftBodyVertices(Mat44Arg transform, Vec3Arg, const CollideSoftBodyVertexIterator& vertices,
                                            uint count, int shape_index) const {
+    const CallInStep call;
     const Mat44 local = transform.InversedRotationTranslation();
     for (CollideSoftBodyVertexIterator v = vertices, end = vertices + count; v != end; ++v) {
         if (v.GetInvMass() <= 0) continue;

@@ -6,6 +6,7 @@
 
 #include <Jolt/Physics/Collision/Shape/Shape.h>
 
+#include "physics/jolt/step_order.h"
 #include "physics/physics.h"
 
 namespace kiln::physics {
@@ -30,10 +31,16 @@ public:
     vec3 center() const { return sdf_->mass().center; }
 
     bool MustBeStatic() const override { return !sdf_->moves(); }
-    JPH::Vec3 GetCenterOfMass() const override { return to_jolt(center()); }
+    JPH::Vec3 GetCenterOfMass() const override {
+        const CallInStep call;
+        return to_jolt(center());
+    }
     JPH::AABox GetLocalBounds() const override;
     JPH::uint GetSubShapeIDBitsRecursive() const override;
-    float GetInnerRadius() const override { return float(sdf_->inner_radius()); }
+    float GetInnerRadius() const override {
+        const CallInStep call;
+        return float(sdf_->inner_radius());
+    }
     JPH::MassProperties GetMassProperties() const override { return {}; }  // given with the body
     const JPH::PhysicsMaterial* GetMaterial(const JPH::SubShapeID&) const override;
     JPH::Vec3 GetSurfaceNormal(const JPH::SubShapeID&, JPH::Vec3Arg local) const override;
