@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-# Builds scenes/*.kiln.json into the scene library (generated/scene/bundled.gen.inl) and installs them beside the documentation.
+# Builds scenes/*.kiln.json and the models beside them into the scene library (generated/scene/bundled.gen.inl) and installs them beside the documentation.
 
 file(GLOB kiln_scene_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/scenes/*.kiln.json)
 list(SORT kiln_scene_files)
@@ -15,6 +15,21 @@ foreach(kiln_scene_file IN LISTS kiln_scene_files)
 endforeach()
 string(APPEND kiln_scene_table "\nconstexpr BundledScene kBundled[] = {\n${kiln_scene_rows}};\n")
 
+# Models that the scenes name, as bytes.
+file(GLOB kiln_scene_models CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/scenes/*.glb)
+list(SORT kiln_scene_models)
+set(kiln_model_rows)
+foreach(kiln_scene_model IN LISTS kiln_scene_models)
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${kiln_scene_model})
+    get_filename_component(kiln_model_name ${kiln_scene_model} NAME)
+    get_filename_component(kiln_model_stem ${kiln_scene_model} NAME_WE)
+    file(READ ${kiln_scene_model} kiln_model_hex HEX)
+    string(REGEX REPLACE "([0-9a-f][0-9a-f])" "0x\\1," kiln_model_bytes "${kiln_model_hex}")
+    string(APPEND kiln_scene_table "\nconstexpr unsigned char k_model_${kiln_model_stem}[] = {${kiln_model_bytes}};\n")
+    string(APPEND kiln_model_rows "    {\"${kiln_model_name}\", k_model_${kiln_model_stem}},\n")
+endforeach()
+string(APPEND kiln_scene_table "\nconstexpr BundledModel kModels[] = {\n${kiln_model_rows}};\n")
+
 set(kiln_scene_out ${PROJECT_BINARY_DIR}/generated/scene/bundled.gen.inl)
 set(kiln_scene_old "")
 if(EXISTS ${kiln_scene_out})
@@ -25,5 +40,5 @@ if(NOT kiln_scene_old STREQUAL kiln_scene_table)
 endif()
 
 if(kiln_scene_files)
-    install(FILES ${kiln_scene_files} DESTINATION ${CMAKE_INSTALL_DATADIR}/kiln/scenes)
+    install(FILES ${kiln_scene_files} ${kiln_scene_models} DESTINATION ${CMAKE_INSTALL_DATADIR}/kiln/scenes)
 endif()

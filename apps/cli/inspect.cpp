@@ -65,6 +65,11 @@ int inspect(const Options& o) {
 
 int validate(const Options& o) {
     auto world = load_scene(o.scene);
+    if (world && !world->faults().empty()) {
+        std::string all;
+        for (const std::string& fault : world->faults()) all += (all.empty() ? "" : "\n") + fault;
+        world = Error{all, ErrorKind::Input};
+    }
     if (o.json) {
         Json json;
         json.text("scene", o.scene).flag("valid", bool(world));

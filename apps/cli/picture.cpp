@@ -49,6 +49,7 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
+    if (!(o.time >= 0 && o.time <= 1e9)) return usage("--time wants seconds, 0 or more");
     if (!o.path.empty() && o.frames < 2) return usage("--path wants --frames, 2 or more");
     if (o.path.empty() && (o.frames != 0 || o.budget != 0))
         return usage("--frames and --budget work with --path; add it");
@@ -136,6 +137,13 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         own.number("bricks_new", stats.instance_bricks_new).number("ms", stats.instances_ms);
         json.raw("instances", own.object());
     }
+    if (stats.triangles > 0)
+        json.number("triangles", double(stats.triangles))
+            .number("triangles_drawn", double(stats.triangles_drawn))
+            .number("triangles_culled", double(stats.triangles - stats.triangles_drawn));
+    std::string faults;
+    for (const std::string& fault : world.faults()) faults += (faults.empty() ? "" : ", ") + Json::quoted(fault);
+    if (!faults.empty()) json.raw("faults", "[" + faults + "]");
     add_journal(json, world);
     return json.line();
 }
@@ -199,6 +207,7 @@ int render_sequence(const PictureOptions& o, const RenderSettings& settings, con
         const Stopwatch baking;
         auto frame = world.frame(along(*stops, double(i) / (o.frames - 1)), budget);
         if (!frame) return progress.stage(""), fail(frame.error());
+        frame->time = frame->time_before = o.time;
         const double bake_ms = 1000 * baking.seconds();
         auto picture = renderer->render(*frame, settings);
         if (!picture) return progress.stage(""), fail(picture.error());
@@ -242,6 +251,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);
     if (!frame) return progress.stage(""), fail(frame.error());
+    frame->time = frame->time_before = o.time;
     const double load = total.seconds();
 
     Result<Picture> picture = Error{};
@@ -268,6 +278,8 @@ int render_picture(const PictureOptions& o) {
         if (o.transcript) introduce(stats);
         std::string later;
         for (const std::string& section : world->not_drawn_yet()) later += (later.empty() ? "" : ", ") + section;
+        for (const std::string& note : world->model_notes()) say("note     " + note);
+        for (const std::string& fault : world->faults()) say("fault    " + fault + "; left out");
         if (!later.empty()) say("note     this version does not draw: " + later);
         if (frame->coarsened > 0)
             say("note     too large for the brick pool: drawn with voxels " +

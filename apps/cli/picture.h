@@ -13,6 +13,7 @@ struct PictureOptions {
     std::string scene, output, camera, size = "1280x720", view = "shaded", device = "auto";
     std::string path;  ///< names of cameras, by commas: a sequence of `frames` pictures along them
     int frames = 0;
+    double time = 0;      ///< seconds, of the meshes' animations
     uint32_t budget = 0;  ///< bricks a frame of a sequence, 0: no limit
     int reference = 0;
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,

@@ -29,6 +29,7 @@ void add_render(CLI::App& app, Run& run) {
                      "names of the scene's cameras in order, by commas, or all: draws --frames pictures along a smooth "
                      "path through them, OUT_0000.png and so on");
     verb->add_option("--frames", o->frames, "how many pictures --path draws");
+    verb->add_option("--time", o->time, "seconds: what the meshes' animations show");
     verb->add_option("--budget", o->budget, "with --path: bricks that a frame may bake; 0 is no limit");
     verb->add_flag("--analytic", o->analytic, "march the edits themselves instead of the bricks");
     verb->add_option("--reference", o->reference,

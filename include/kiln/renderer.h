@@ -22,6 +22,9 @@ class BrickSet;
 class Clipmap;
 class Field;
 }  // namespace field
+namespace model {
+struct Drawable;
+}
 namespace render::shade {
 struct EnvironmentMap;
 }
@@ -83,6 +86,12 @@ struct EditOutline {
     Outline outline;
 };
 
+/// A triangle mesh in the world.
+struct MeshInstance {
+    std::shared_ptr<const model::Drawable> model;  ///< immutable
+    Transform transform, before;                   ///< world from model: now, and in the frame before (for motion)
+};
+
 /// Everything a picture is made from. World::frame() fills one in.
 struct Frame {
     std::shared_ptr<const field::Field> field;     ///< immutable snapshot; none in a world of several levels
@@ -95,6 +104,8 @@ struct Frame {
     int coarsened = 0;                  ///< times the voxel size was doubled to fit the pool
     std::vector<Instance> instances;    ///< solid beside the field, as a hard union with it
     std::vector<EditOutline> outlines;  ///< of shaded pictures
+    std::vector<MeshInstance> meshes;
+    double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
 };
 
 struct RenderSettings {
@@ -150,6 +161,8 @@ struct RenderStats {
     uint32_t instance_bricks = 0;      ///< resident, of their sets
     uint32_t instance_bricks_new = 0;  ///< … of them brought to the device by this frame
     double instances_ms = 0;           ///< CPU time: their tree and records
+    uint64_t triangles = 0;            ///< of meshes, in the scene
+    uint64_t triangles_drawn = 0;      ///< given to the rasteriser
 };
 
 struct DeviceInfo {

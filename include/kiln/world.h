@@ -213,7 +213,9 @@ public:
     std::string history_json() const;
     /// What was found in the model files that the edits read, one sentence each: "bunny.obj: closed manifold of 69666 triangles".
     std::vector<std::string> model_notes() const;
-    /// Sections of the scene that this version reads and keeps but does not draw ("meshes", "fluids", …).
+    /// Meshes that the scene names and that cannot be read, an error each: they are left out, the rest is drawn.
+    std::vector<std::string> faults() const;
+    /// Sections of the scene that this version reads and keeps but does not draw ("bodies", "fluids", …).
     std::vector<std::string> not_drawn_yet() const;
 
     struct Impl;

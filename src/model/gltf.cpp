@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
-// glTF 2.0, text and binary, through tinygltf: the triangles of the default scene's nodes, each in its node's place. Images are not
-// looked at; skins and morphs stay in their rest pose. What tinygltf throws ends here.
+// glTF 2.0 as bare triangles: those of the default scene's nodes, each in its node's place. Images are not looked at; skins and morphs stay
+// in their rest pose.
 
+#include "model/gltf_file.h"
 #include "model/triangles.h"
 
 #include "base/format.h"
@@ -9,66 +10,10 @@
 #include <cmath>
 #include <cstring>
 
-#define TINYGLTF_IMPLEMENTATION
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#define TINYGLTF_NO_EXTERNAL_IMAGE
-#include <tiny_gltf.h>
-
 namespace kiln::model {
 namespace {
 
-using Matrix = std::array<double, 16>;  // columns, as glTF writes them
-
-constexpr Matrix kIdentity{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-
-Matrix times(const Matrix& a, const Matrix& b) {
-    Matrix out{};
-    for (size_t c = 0; c < 4; ++c)
-        for (size_t r = 0; r < 4; ++r)
-            for (size_t k = 0; k < 4; ++k) out[4 * c + r] += a[4 * k + r] * b[4 * c + k];
-    return out;
-}
-
-Matrix matrix_of(const tinygltf::Node& node) {
-    Matrix out = kIdentity;
-    if (node.matrix.size() == 16) {
-        std::copy(node.matrix.begin(), node.matrix.end(), out.begin());
-        return out;
-    }
-    if (node.rotation.size() == 4) {
-        const double x = node.rotation[0], y = node.rotation[1], z = node.rotation[2], w = node.rotation[3];
-        out = {1 - 2 * (y * y + z * z),
-               2 * (x * y + z * w),
-               2 * (x * z - y * w),
-               0,
-               2 * (x * y - z * w),
-               1 - 2 * (x * x + z * z),
-               2 * (y * z + x * w),
-               0,
-               2 * (x * z + y * w),
-               2 * (y * z - x * w),
-               1 - 2 * (x * x + y * y),
-               0,
-               0,
-               0,
-               0,
-               1};
-    }
-    if (node.scale.size() == 3)
-        for (size_t c = 0; c < 3; ++c)
-            for (size_t r = 0; r < 3; ++r) out[4 * c + r] *= node.scale[c];
-    if (node.translation.size() == 3)
-        for (size_t r = 0; r < 3; ++r) out[12 + r] = node.translation[r];
-    return out;
-}
-
-// The turn that a mirroring transform gives every triangle.
-bool mirrors(const Matrix& m) {
-    return m[0] * (m[5] * m[10] - m[6] * m[9]) - m[4] * (m[1] * m[10] - m[2] * m[9]) +
-               m[8] * (m[1] * m[6] - m[2] * m[5]) <
-           0;
-}
+bool mirrors(const Matrix& m) { return determinant(m) < 0; }
 
 class Reader {
 public:
@@ -100,7 +45,7 @@ public:
             // Nodes are a forest: more visits than nodes means that one has two parents, or contains itself.
             if (++visits > model_.nodes.size()) return fault("a node that contains itself");
             const tinygltf::Node& node = model_.nodes[size_t(v.node)];
-            const Matrix place = times(v.place, matrix_of(node));
+            const Matrix place = times(v.place, node_matrix(node));
             if (node.mesh >= 0) {
                 if (size_t(node.mesh) >= model_.meshes.size()) return fault("a mesh that does not exist");
                 for (const tinygltf::Primitive& p : model_.meshes[size_t(node.mesh)].primitives)
@@ -112,39 +57,7 @@ public:
     }
 
 private:
-    Error fault(const std::string& what) const {
-        return Error{name_ + ": refers to " + what + "; the file is damaged, export it again", ErrorKind::Input};
-    }
-
-    // An accessor's elements lie inside its buffer; `stride` apart.
-    struct Bytes {
-        const unsigned char* at = nullptr;
-        size_t stride = 0;
-        size_t count = 0;
-    };
-    Result<Bytes> bytes_of(const tinygltf::Accessor& a, size_t element) const {
-        Bytes out;
-        out.count = a.count;
-        if (a.sparse.isSparse)
-            return Error{name_ + ": has sparse accessors, which are not read; export it without them",
-                         ErrorKind::Input};
-        if (a.bufferView < 0 || size_t(a.bufferView) >= model_.bufferViews.size())
-            return fault("a buffer view that does not exist");
-        const tinygltf::BufferView& view = model_.bufferViews[size_t(a.bufferView)];
-        if (view.buffer < 0 || size_t(view.buffer) >= model_.buffers.size())
-            return fault("a buffer that does not exist");
-        const std::vector<unsigned char>& data = model_.buffers[size_t(view.buffer)].data;
-        out.stride = view.byteStride != 0 ? view.byteStride : element;
-        const size_t limit = data.size();
-        if (view.byteOffset > limit || a.byteOffset > limit || a.count > limit || out.stride > limit)
-            return fault("bytes outside its buffer");
-        const size_t from = view.byteOffset + a.byteOffset;
-        if (a.count > 0 && (from > limit || (a.count - 1) > (limit - from) / out.stride ||
-                            (a.count - 1) * out.stride + element > limit - from))
-            return fault("bytes outside its buffer");
-        out.at = data.data() + from;
-        return out;
-    }
+    Error fault(const std::string& what) const { return gltf_fault(name_, what); }
 
     Result<void> primitive(const tinygltf::Primitive& p, const Matrix& place) {
         constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
@@ -158,7 +71,7 @@ private:
         if (corners.type != TINYGLTF_TYPE_VEC3 || corners.componentType != TINYGLTF_COMPONENT_TYPE_FLOAT)
             return Error{name_ + ": has compressed positions, which are not read; export it without compression",
                          ErrorKind::Input};
-        const auto floats = bytes_of(corners, 12);
+        const auto floats = accessor_bytes(model_, corners, 12, name_);
         if (!floats) return floats.error();
         const auto first = uint32_t(out_.positions.size());
         if (out_.positions.size() + floats->count > 3 * kMostTriangles)
@@ -183,7 +96,7 @@ private:
             if (a.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT) size = 2;
             if (a.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) size = 4;
             if (size == 0 || a.type != TINYGLTF_TYPE_SCALAR) return fault("indices of a wrong type");
-            const auto indices = bytes_of(a, size);
+            const auto indices = accessor_bytes(model_, a, size, name_);
             if (!indices) return indices.error();
             order.resize(indices->count);
             for (size_t i = 0; i < order.size(); ++i) {
@@ -218,44 +131,21 @@ private:
     Triangles out_;
 };
 
-bool no_image(tinygltf::Image*, const int, std::string*, std::string*, int, int, const unsigned char*, int, void*) {
-    return true;
-}
-
 }  // namespace
 
 Result<Triangles> parse_gltf(std::string_view bytes, const std::string& name, const std::string& folder) {
-    try {
-        tinygltf::Model model;
-        tinygltf::TinyGLTF loader;
-        loader.SetImageLoader(no_image, nullptr);
-        std::string why, warning;
-        const bool binary = bytes.starts_with("glTF");
-        if (bytes.size() > (size_t(1) << 31))
-            return Error{name + ": larger than 2 GiB; split the model", ErrorKind::Input};
-        const auto size = unsigned(bytes.size());
-        const bool read =
-            binary ? loader.LoadBinaryFromMemory(&model, &why, &warning,
-                                                 reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
-                   : loader.LoadASCIIFromString(&model, &why, &warning, bytes.data(), size, folder);
-        if (!read) {
-            for (char& c : why) c = c == '\n' ? ' ' : c;
-            while (why.ends_with(' ')) why.pop_back();
-            return Error{formatted("{}: not a glTF file that can be read: {}; export it again", name, why),
+    auto model = load_gltf(bytes, name, folder);
+    if (!model) return model.error();
+    for (const std::string& need : model->extensionsRequired) {
+        if (need == "KHR_draco_mesh_compression" || need == "EXT_meshopt_compression" ||
+            need == "KHR_mesh_quantization")
+            return Error{formatted("{}: needs {}, which is not read; export it without compression", name, need),
                          ErrorKind::Input};
-        }
-        for (const std::string& need : model.extensionsRequired) {
-            if (need == "KHR_draco_mesh_compression" || need == "EXT_meshopt_compression" ||
-                need == "KHR_mesh_quantization")
-                return Error{formatted("{}: needs {}, which is not read; export it without compression", name, need),
-                             ErrorKind::Input};
-        }
-        return Reader(model, name).run();
+    }
+    try {
+        return Reader(*model, name).run();
     } catch (const std::bad_alloc&) {
         return Error{name + ": not enough memory for it; simplify the model", ErrorKind::OutOfMemory};
-    } catch (const std::exception& e) {
-        return Error{formatted("{}: not a glTF file that can be read: {}; export it again", name, e.what()),
-                     ErrorKind::Input};
     }
 }
 

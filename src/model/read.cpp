@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which reader a file gets, and what all of them promise.
 
+#include "model/drawable.h"
 #include "model/triangles.h"
 
 #include "base/format.h"
@@ -48,18 +49,37 @@ bool has_model_ending(std::string_view path) {
 
 bool is_gltf(std::string_view path) { return ending(path) == ".gltf" || ending(path) == ".glb"; }
 
-Result<Triangles> read(const std::string& path) {
-    const std::string e = ending(path);
+namespace {
+
+Result<std::string> model_bytes(const std::string& path) {
     if (!has_model_ending(path))
         return Error{formatted("{}: not a kind of model that is read; the name must end in {}", path, kModelEndings),
                      ErrorKind::Input};
-    const auto bytes = bytes_of(path);
+    return bytes_of(path);
+}
+
+}  // namespace
+
+Result<Triangles> read(const std::string& path) {
+    const std::string e = ending(path);
+    const auto bytes = model_bytes(path);
     if (!bytes) return bytes.error();
     if (e == ".obj") return parse_obj(*bytes, path);
     if (e == ".stl") return parse_stl(*bytes, path);
     if (e == ".ply") return parse_ply(*bytes, path);
     if (e == ".off") return parse_off(*bytes, path);
     return parse_gltf(*bytes, path, path.substr(0, path.find_last_of('/') + 1));
+}
+
+Result<Drawable> read_drawable(const std::string& path) {
+    if (!is_gltf(path)) {
+        auto triangles = read(path);
+        if (!triangles) return triangles.error();
+        return drawable_of(*triangles, path);
+    }
+    const auto bytes = model_bytes(path);
+    if (!bytes) return bytes.error();
+    return parse_gltf_drawable(*bytes, path, path.substr(0, path.find_last_of('/') + 1));
 }
 
 Result<Triangles> checked(Triangles mesh, const std::string& name) {

@@ -113,10 +113,12 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
     return out;
 }
 
-TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image& refined) {
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image words, const Image& refined) {
     TileResult out;
+    if (in.has_meshes) words = see_meshes(g, in, words, refined);
     Surface surface = resolve(g, in, words, refined);
     resolve_instances(g, in, words, refined, surface);
+    if (in.has_meshes) resolve_meshes(g, in, surface);
     if (wanted == View::Shaded) {
         Image radiance = light(g, in, surface.seen, surface);
         if (in.taa) radiance = taa(g, in, radiance, surface.depth, motion(g, in, surface.seen));
@@ -180,12 +182,14 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
     instance_kernels(in, view == View::Shaded, out);
+    if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;
     }
     out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
+    if (in.has_meshes) out.push_back(&kMeshShadow);
     out.push_back(&light_kernel(in));
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (!in.develops) return out;
@@ -197,6 +201,11 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.outline_count > 0)
         out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
     return out;
+}
+
+std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
+    if (!in.has_meshes) return {};
+    return {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
 }
 
 }  // namespace kiln::render

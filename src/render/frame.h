@@ -33,5 +33,6 @@ TileResult record_tile(Graph& g, const TileInputs& in, View view, std::span<cons
 
 // Kernels of a frame, for warm-up.
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view);
+std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in);
 
 }  // namespace kiln::render

@@ -6,6 +6,7 @@
 #include "render/lib/color.gpu.h"
 #include "render/lib/pack.h"
 #include "render/lib/shading.gpu.h"
+#include "render/mesh_trace.h"
 
 #include <algorithm>
 #include <cmath>
@@ -97,7 +98,8 @@ struct Scene {
     }
 
     bool reaches(dvec3 p, dvec3 direction, double distance) const {
-        return reference_hit(field, p, direction, distance) < 0;
+        return reference_hit(field, p, direction, distance) < 0 &&
+               !(field.meshes && field.meshes->hides(p, direction, distance));
     }
 };
 
@@ -106,10 +108,27 @@ struct Hit {
     dvec3 p;  // just off the surface: where the next rays start
     vec3 n;   // as the shaders get it
     Material material;
+    float ambient = 1;  // share of the sky's light that a texture leaves, where nothing else occludes it
 };
 
-Hit hit_at(const Scene& scene, dvec3 origin, dvec3 direction, double t) {
+// The nearer of the field and the meshes; t < 0: neither.
+Hit first_hit(const Scene& scene, dvec3 origin, dvec3 direction, double t_last) {
     Hit hit;
+    double t = reference_hit(scene.field, origin, direction, t_last);
+    if (scene.field.meshes) {
+        if (const auto seen = scene.field.meshes->hit(origin, direction, t < 0 ? t_last : t)) {
+            hit.t = seen->t;
+            hit.n = narrow(seen->normal);
+            hit.material = seen->material;
+            hit.ambient = seen->ambient;
+            hit.p = along(seen->round, seen->face, 1e-6 * std::max(0.1, seen->t));
+            return hit;
+        }
+    }
+    if (t < 0) {
+        hit.t = -1;
+        return hit;
+    }
     hit.t = t;
     const dvec3 p = along(origin, direction, t);
     const dvec3 n = scene.normal(p);
@@ -157,7 +176,7 @@ double disc_distance(const LightSample& light, const Scene& scene) {
 // samples = 0: as the lighting pass does it, with the visible fraction counted by rays.
 vec3 direct(const Scene& scene, const Hit& hit, dvec3 direction, Random& random) {
     const SurfaceView s = view_of(scene, hit, direction);
-    vec3 sum = scene.around(s) + hit.material.emissive;
+    vec3 sum = scene.around(s) * hit.ambient + hit.material.emissive;
     for (const LightRecord& record : scene.lights) {
         const LightSample light = shade::sample_light(record, narrow(hit.p));
         if (dot(hit.n, light.l) <= 0 || largest3(light.illuminance) <= 0) continue;
@@ -217,10 +236,9 @@ Bounce bounce(const SurfaceView& s, Random& random) {
 vec3 path(const Scene& scene, dvec3 origin, dvec3 direction, Random& random, bool& seen) {
     vec3 sum{}, carried{1, 1, 1};
     for (int depth = 0;; ++depth) {
-        const double t = reference_hit(scene.field, origin, direction, scene.settings.farthest);
-        if (depth == 0) seen = t >= 0;
-        if (t < 0) return sum + carried * scene.radiance(direction, depth == 0);
-        const Hit hit = hit_at(scene, origin, direction, t);
+        const Hit hit = first_hit(scene, origin, direction, scene.settings.farthest);
+        if (depth == 0) seen = hit.t >= 0;
+        if (hit.t < 0) return sum + carried * scene.radiance(direction, depth == 0);
         sum = sum + carried * hit.material.emissive;
         const SurfaceView s = view_of(scene, hit, direction);
         for (const LightRecord& record : scene.lights) {
@@ -299,12 +317,11 @@ ReferencePicture render_reference(const ReferenceField& field, std::span<const L
         const int x = i % settings.width, y = i / settings.width;
         Random middle_random(uint32_t(x), uint32_t(y), 0, settings.seed);
         const dvec3 middle = direction_at(float(x) + 0.5f, float(y) + 0.5f);
-        const double t = reference_hit(field, origin, middle, settings.farthest);
+        const Hit hit = first_hit(scene, origin, middle, settings.farthest);
         vec3 sum{};
         double covered = 0;
-        if (t >= 0) {
-            const Hit hit = hit_at(scene, origin, middle, t);
-            out.depth[at] = float(t);
+        if (hit.t >= 0) {
+            out.depth[at] = float(hit.t);
             out.normal[at] = hit.n;
             if (settings.samples == 0) sum = direct(scene, hit, middle, middle_random);
             covered = 1;

@@ -21,12 +21,15 @@
 
 namespace kiln::render {
 
+class MeshTrace;
+
 // All functions are called from many threads at once.
 struct ReferenceField {
     std::function<double(dvec3)> distance;    // metres, negative inside, 1-Lipschitz
     std::function<dvec3(dvec3)> normal;       // unit, at a surface point; empty: central differences of the distance
     std::function<Material(dvec3)> material;  // at a surface point
     Box3 bounds;                              // holds all that is solid; faces may be infinite
+    const MeshTrace* meshes = nullptr;        // triangles beside it
 };
 
 struct ReferenceSettings {

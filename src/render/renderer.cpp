@@ -42,6 +42,7 @@ struct Renderer::Impl {
     std::unique_ptr<Runner> runner;
     std::unique_ptr<GpuField> field;
     std::unique_ptr<GpuInstances> instances;
+    std::unique_ptr<GpuMeshes> meshes;
     std::string fault;  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
@@ -61,6 +62,7 @@ struct Renderer::Impl {
     ~Impl() {
         instances.reset();
         field.reset();
+        meshes.reset();
         for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
             if (!runner || !buffer) continue;
             runner->forget(buffer);
@@ -116,6 +118,7 @@ struct Renderer::Impl {
         in.use_of_bricks = field->use(false);
         in.has_instances = !frame.instances.empty();
         in.use_of_instances = instances->use();
+        in.has_meshes = !meshes->empty();
         return in;
     }
     void add_times(const FrameTimes& times);
@@ -134,6 +137,7 @@ Result<void> Renderer::Impl::prepare() {
     runner = std::make_unique<Runner>(*device);
     field = std::make_unique<GpuField>(*runner);
     instances = std::make_unique<GpuInstances>(*runner, *field);
+    meshes = std::make_unique<GpuMeshes>(*runner);
     const std::span<const uint32_t> table = shade::ggx_albedo_table();
     auto buffer = device->create_buffer({.size = table.size_bytes(), .label = "ggx albedo"});
     if (!buffer) return buffer.error();
@@ -213,6 +217,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         if (in.taa)
             in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
                                               params.width, params.height));
+        in.meshes = meshes->import(g);
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -319,11 +324,13 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         if (outlined.left_out > 0)
             log::warn("outlines of {} edits are not drawn: the GPU cannot run their code", outlined.left_out);
     }
-    if (auto warm = runner->pipelines().warm_up(frame_kernels(inputs(frame, settings), settings.view)); !warm)
-        return warm.error();
-
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
+    if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
+    const TileInputs switches = inputs(frame, settings);
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
+        !warm)
+        return warm.error();
     params->sky = shade::sky_params(frame);
     instances->place(frame.instances, *params);
     const bool taa = settings.taa && settings.view == View::Shaded;
@@ -387,6 +394,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
+    stats.triangles = meshes->triangles();
+    stats.triangles_drawn = meshes->triangles_drawn();
     if (runner->pipelines().made_late() != late)
         log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
     if (auto ok = healthy(); !ok) return ok.error();

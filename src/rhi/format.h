@@ -22,8 +22,9 @@ enum class Format : uint8_t {
     Rgba32Uint,
     R11g11b10Float,
     Depth32Float,
+    Rgba8Srgb,  // decoded to linear before filtering; sampled and copied only
 };
-constexpr int kFormatCount = 14;
+constexpr int kFormatCount = 15;
 
 // How a shader sees a texel.
 enum class SampleType : uint8_t { Float, Uint, Depth };

@@ -6,6 +6,9 @@
 
 #include <kiln/world.h>
 
+#include <algorithm>
+#include <iterator>
+
 namespace kiln::scene {
 
 namespace {
@@ -13,6 +16,13 @@ namespace {
 }  // namespace
 
 std::span<const BundledScene> bundled_files() { return kBundled; }
+
+std::span<const unsigned char> bundled_model(std::string_view scene, std::string_view file) {
+    const auto same = [](std::string_view name) { return [=](const auto& row) { return row.name == name; }; };
+    if (std::none_of(std::begin(kBundled), std::end(kBundled), same(scene))) return {};
+    const auto found = std::find_if(std::begin(kModels), std::end(kModels), same(file));
+    return found == std::end(kModels) ? std::span<const unsigned char>{} : found->bytes;
+}
 
 }  // namespace kiln::scene
 

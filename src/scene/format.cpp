@@ -114,6 +114,7 @@ constexpr KeyRow kMeshRows[] = {
     numbers("position", 3, kKept, {0, 0, 0}, "m", "any", "of the mesh's origin"),
     plain("rotation", KeyType::Rotation, "quaternion [x, y, z, w]"),
     plain("scale", KeyType::Scale, "a number or three, > 0"),
+    plain("material", KeyType::Text, "name of a material instead of the file's; files without any are grey"),
     plain("hidden", KeyType::Bool, "kept, not drawn"),
     plain("group", KeyType::Text, "name of a group, for editors"),
     inside("outline", KeyType::Object, kOutlineTable, "a line around it on the screen"),

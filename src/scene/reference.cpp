@@ -8,6 +8,7 @@
 #include "render/lens.h"
 #include "render/lib/pack.h"
 #include "render/merged.h"
+#include "render/mesh_trace.h"
 #include "render/reference.h"
 
 #include <kiln/renderer.h>
@@ -59,6 +60,9 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
         field.bounds =
             field.bounds.inflated(program.index.largest_reach());  // smooth unions bulge beyond their operands
     }
+    const render::MeshSet meshes = render::make_mesh_set(frame);
+    const render::MeshTrace trace(meshes);
+    if (!meshes.empty()) field.meshes = &trace;
     const render::ReferencePicture traced =
         render::render_reference(field, frame.lights, render::shade::sky_params(frame), frame.camera,
                                  {.width = settings.width,
@@ -79,6 +83,9 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
         stats->bricks = frame.levels ? int(frame.levels->bricks()) : int(frame.field->stats().bricks);
         stats->frame_ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
         stats->passes = {{"reference", stats->frame_ms}};
+        for (const render::MeshSet::Part& part : meshes.parts)
+            stats->triangles += meshes.primitive(part).index_count / 3;
+        stats->triangles_drawn = stats->triangles;
         stats->coarsened = frame.coarsened;
         stats->exposure = exposure.multiplier;
     }

@@ -9,6 +9,7 @@
 
 #include "base/format.h"
 #include "field/level_cells.gpu.h"
+#include "model/triangles.h"
 
 #include <bit>
 #include <cmath>
@@ -179,8 +180,9 @@ private:
     bool ids(std::string_view list, std::unordered_map<std::string_view, uint32_t>& out) {
         const auto at = section(list);
         if (!at) return true;
-        // Bodies show their edits; those of meshes are not seen while meshes are not.
-        if (doc_.first(*at) != doc_.next(*at) && list != "bodies") scene_.undrawn.emplace_back(list);
+        // Bodies show their edits.
+        const bool drawn = list == "meshes" || list == "bodies";
+        if (!drawn && doc_.first(*at) != doc_.next(*at)) scene_.undrawn.emplace_back(list);
         uint32_t n = 0;
         for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c), ++n) {
             const JsonIndex id = *doc_.find(c, "id");
@@ -189,6 +191,22 @@ private:
                 return in_.fail(id,
                                 formatted("{}[{}] has this id too; ids are unique, choose another", list, old->second));
         }
+        return true;
+    }
+
+    bool mesh(JsonIndex at, SceneMesh& out) {
+        out.place = at;
+        out.id = doc_.text(*doc_.find(at, "id"));
+        const JsonIndex file = *doc_.find(at, "file");
+        out.file = doc_.text(file);
+        if (out.file.empty())
+            return in_.fail(file, formatted("an empty file name; name a model, ending in {}", model::kModelEndings));
+        Transform& t = out.transform;
+        if (const auto v = doc_.find(at, "position"))
+            if (!in_.numbers(*v, find_row(kMeshTable, "position")->numbers, &t.position.x)) return false;
+        if (const auto v = doc_.find(at, "rotation"); v && !in_.rotation(*v, &t.rotation)) return false;
+        if (const auto v = doc_.find(at, "scale"); v && !in_.scale(*v, &t.scale)) return false;
+        if (const auto v = doc_.find(at, "hidden")) out.hidden = doc_.is(*v, JsonType::True);
         return true;
     }
 
@@ -203,6 +221,18 @@ private:
             std::sort(names.begin(), names.end());
             return names;
         };
+        if (const auto at = section("meshes")) {
+            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
+                SceneMesh mesh;
+                if (!this->mesh(c, mesh)) return false;
+                if (const auto m = doc_.find(c, "material")) {
+                    if (!scene_.material_numbers.contains(doc_.text(*m)))
+                        return in_.unknown_name(*m, "material", known(scene_.material_numbers));
+                    mesh.material = doc_.text(*m);
+                }
+                scene_.meshes.push_back(std::move(mesh));
+            }
+        }
         if (const auto at = section("physics"); at && !in_.table(*at, kPhysicsTable, &scene_.physics.gravity.x))
             return false;
         std::unordered_map<std::string_view, std::string_view> owners;  // bodies by edit

@@ -54,6 +54,15 @@ struct SceneTrigger {
     JsonIndex place = 0;
 };
 
+/// An entry of "meshes". Saving keeps it as its file has it.
+struct SceneMesh {
+    std::string id, file;
+    std::string material;  ///< of the scene, instead of the file's; empty: the file's own
+    Transform transform;
+    bool hidden = false;
+    JsonIndex place = 0;
+};
+
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its
 /// sections that the engine does not act on yet, and how it wrote what has two forms.
 struct SceneData {
@@ -81,13 +90,14 @@ struct SceneData {
     ScenePhysics physics;
     std::vector<SceneBody> bodies;
     std::vector<SceneTrigger> triggers;
+    std::vector<SceneMesh> meshes;
 
     // Where things stand in `source`; kNowhere for what was added later.
     static constexpr JsonIndex kNowhere = UINT32_MAX;
     std::vector<JsonIndex> edit_places;
     std::vector<std::vector<JsonIndex>> object_places;  ///< by object, by node
 
-    /// Sections with content that this version keeps but does not draw, "meshes", "bodies", …
+    /// Sections with content that this version keeps but does not draw, "bodies", "cloths", …
     std::vector<std::string> undrawn;
 };
 

@@ -46,6 +46,7 @@ Result<void> World::Impl::read(World& world, std::string text, const std::string
 Result<void> World::Impl::get_ready(World& world) {
     // Compiled now, so that faults which only the whole scene shows come with their place.
     if (auto done = compile_all(); !done) return done;
+    meshes = scene::load_meshes(data);
     if (!world.environment || world.environment->file.empty()) return {};
     return read_sky(world.environment->file);
 }

@@ -279,7 +279,10 @@ Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 fo
 }
 
 Result<Camera> World::camera(std::string_view name) const {
-    if (name.empty()) return cameras.empty() ? scene::framing_camera(impl_->whole()->bounds) : cameras.front().second;
+    if (name.empty())
+        return cameras.empty()
+                   ? scene::framing_camera(box_union(impl_->whole()->bounds, impl_->meshes.bounds(impl_->data)))
+                   : cameras.front().second;
     std::vector<std::string_view> names;
     for (const auto& [known, value] : cameras) {
         if (known == name) return value;
@@ -320,6 +323,7 @@ Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) cons
         const Edit& e = *impl_->edits[slot].edit;
         if (e.outline && !e.hidden) out.outlines.push_back({impl_->edits[slot].row, *e.outline});
     });
+    out.meshes = impl_->meshes.instances(impl_->data);
     out.lights = lights;
     out.environment = environment;
     const bool image = environment && !environment->file.empty();
@@ -379,6 +383,24 @@ std::string World::inspect_json() const {
     out["bounds"] = box_json(program->bounds);
     out["unbounded"] = program->unbounded;
     out["instructions"] = program->tape().size();
+    Json drawn = Json::array();
+    for (size_t i = 0; i < data.meshes.size(); ++i) {
+        const scene::SceneMesh& mesh = data.meshes[i];
+        Json one = {{"id", mesh.id}, {"file", mesh.file}, {"hidden", mesh.hidden}};
+        if (const auto& d = impl_->meshes.models[i]) {
+            one["triangles"] = d->triangle_count();
+            one["vertices"] = d->vertices.size();
+            one["materials"] = d->surfaces.size();
+            one["images"] = d->images.size();
+            one["nodes"] = d->nodes.size();
+            one["skins"] = d->skins.size();
+            one["seconds"] = d->duration;
+            one["bounds"] = box_json(model::bounds_of(*d));
+        }
+        drawn.push_back(one);
+    }
+    if (!drawn.empty()) out["triangle_meshes"] = drawn;
+    if (!impl_->meshes.faults.empty()) out["faults"] = impl_->meshes.faults;
     Json meshes = Json::array();
     for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes) {
         const model::BakeReport& r = note.report;
@@ -423,8 +445,11 @@ std::vector<std::string> World::model_notes() const {
     std::vector<std::string> out;
     for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes)
         out.push_back(formatted("{}: {}", note.file, note.report.sentence()));
+    out.insert(out.end(), impl_->meshes.notes.begin(), impl_->meshes.notes.end());
     return out;
 }
+
+std::vector<std::string> World::faults() const { return impl_->meshes.faults; }
 
 std::vector<std::string> World::not_drawn_yet() const { return impl_->data.undrawn; }
 

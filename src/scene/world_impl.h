@@ -10,6 +10,7 @@
 #include "scene/journal.h"
 #include "scene/movers.h"
 #include "scene/scene_file.h"
+#include "scene/scene_meshes.h"
 #include "scene/sky_image.h"
 
 #include "base/hash.h"
@@ -131,6 +132,7 @@ struct World::Impl {
     std::vector<uint32_t> levels_apart;
     std::vector<field::RowChange> level_changes;  ///< since `levels`
     scene::Grids grids;
+    scene::SceneMeshes meshes;
 
     // What moves as a whole (world_movers.cpp). The owner's thread, but for the last three.
     std::map<uint32_t, scene::Mover> movers;          ///< by the slot of their first edit

@@ -92,6 +92,7 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"render potter -o a.png --frobnicate", "--help"},
         {"render potter -o a.png --path all", "--frames"},
         {"render potter -o a.png --frames 9", "--path"},
+        {"render potter -o a.png --time -1", "0 or more"},
         {"render potter -o a.png --path all --frames 2 --camera main", "leave --camera"},
         {"render potter -o a.png --path main,maim --frames 2 --size 8x8", "did you mean \"main\"?"},
         {"render potter -o a.png --path main --frames 2 --size 8x8", "two cameras"},
@@ -295,8 +296,9 @@ TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
 TEST_F(Cli, DemoListsScenes) {
     const Outcome o = run("demo --list");
     EXPECT_EQ(o.code, 0);
-    for (const char* name : {"archipelago", "orbit", "potter", "quarry"}) EXPECT_THAT(o.out, HasSubstr(name));
-    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 4);
+    for (const char* name : {"archipelago", "orbit", "potter", "quarry", "workbench"})
+        EXPECT_THAT(o.out, HasSubstr(name));
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 5);
 }
 
 TEST_F(Cli, APathIsASequenceAndLevelsFollowIt) {
@@ -433,10 +435,24 @@ TEST_F(CliGpu, RenderWritesThePictureAndItsCost) {
 
 TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
     write("later.kiln.json",
-          "{\"format\": 1, \"meshes\": [{\"id\": \"m\", \"file\": \"m.glb\"}], \"edits\": [{\"shape\": \"sphere\"}]}");
+          "{\"format\": 1, \"cloths\": [{\"id\": \"flag\", \"size\": [1, 1]}], \"edits\": [{\"shape\": \"sphere\"}]}");
     const Outcome o = run("render later.kiln.json -o a.png --size 16x16");
     EXPECT_EQ(o.code, 0) << o.err;
-    EXPECT_THAT(o.err, HasSubstr("does not draw: meshes"));
+    EXPECT_THAT(o.err, HasSubstr("does not draw: cloths"));
+}
+
+TEST_F(CliGpu, AMeshThatCannotBeReadIsToldAndTheRestIsDrawn) {
+    write("m.kiln.json",
+          "{\"format\": 1, \"meshes\": [{\"id\": \"m\", \"file\": \"m.glb\"}, {\"id\": \"t\", \"file\": \"t.obj\"}], "
+          "\"edits\": "
+          "[{\"shape\": \"sphere\"}]}");
+    write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    const Outcome o = run("render m.kiln.json -o a.png --size 16x16 --json");
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(o.err, HasSubstr("fault    m.kiln.json:1:46: meshes[0].file: m.glb: cannot be read"));
+    EXPECT_THAT(o.out, HasSubstr("\"triangles\": 1, \"triangles_drawn\": 1, \"triangles_culled\": 0"));
+    EXPECT_THAT(o.out, HasSubstr("\"faults\": [\"m.kiln.json:1:46: "));
+    EXPECT_EQ(run("validate m.kiln.json").code, 3);
 }
 
 TEST_F(Cli, ExportWritesWholeFilesOrNone) {

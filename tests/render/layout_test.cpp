@@ -141,10 +141,11 @@ TEST(Layout, PushDataIsTheSame) {
 
 TEST(Layout, EveryKernelFitsTheFloor) {
     for (const Kernel* kernel :
-         {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch,        &kMarchExact,
-          &kRefine,   &kResolve,    &kResolveExact, &kShadow,         &kShadowExact,  &kShadowLevelsExact,
-          &kCluster,  &kMotion,     &kTaa,          &kOutlineMask,    &kOutlineFlood, &kOutlineDraw,
-          &kLight, &kTonemap, &kView, &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
+         {&kBakeHalf,       &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch,           &kMarchExact,
+          &kRefine,         &kResolve,    &kResolveExact, &kShadow,         &kShadowExact,     &kShadowLevelsExact,
+          &kCluster,        &kMotion,     &kTaa,          &kOutlineMask,    &kOutlineFlood,    &kOutlineDraw,
+          &kLight,          &kTonemap,    &kView,         &kMarchInstances, &kRefineInstances, &kResolveInstances,
+          &kShadowInstances}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

@@ -73,6 +73,7 @@ KILN_CONST uint kSeenInside = 2u;   // solid without a brick: the camera is in i
 KILN_CONST uint kSeenPruned = 3u;   // exact code of brick `slot`
 KILN_CONST uint kSeenOutside = 4u;  // exact code of what leaves the grid
 KILN_CONST uint kSeenProgram = 5u;  // exact code of the whole program
+KILN_CONST uint kSeenMesh = 6u;     // triangle `slot` of the frame's meshes; z: the part it belongs to
 // The trilinear surface in a brick of an instance: slot is the instance's number; z is its voxel | the brick's slot in its set << 9.
 KILN_CONST uint kSeenInstance = 7u;
 

@@ -28,6 +28,7 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
         const ShadowPush push{.first_light = first, .more = next < in.lights_of_tile ? 1u : 0u, .pad_0 = 0, .pad_1 = 0};
         Image fractions = shadow(g, in, visibility, surface, masks, push);
         shadow_instances(g, in, visibility, surface, masks, first, fractions);
+        if (in.has_meshes) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
         g.dispatch(light_kernel(in), in.size,
                    {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table),
                     g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions), g.read(masks),

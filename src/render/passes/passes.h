@@ -4,6 +4,7 @@
 
 #include "render/gpu_field.h"
 #include "render/gpu_instances.h"
+#include "render/gpu_meshes.h"
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
@@ -22,6 +23,8 @@ extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResol
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
     kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
+extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
+extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -76,6 +79,8 @@ struct TileInputs {
     uint32_t outline_count = 0;
     float widest_outline = 0;
     TapeUse use_of_outlines;
+    MeshHandles meshes;
+    bool has_meshes = false;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -98,6 +103,14 @@ Image refine(Graph& g, const TileInputs& in, const Image& visibility);
 // The same words from the same visibility words, made here: software devices run the tape many times slower.
 std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams& frame,
                                      std::span<const uint32_t> visibility);
+
+// Visibility words where meshes that are nearer than the field are seen.
+Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+// Fills in the surface where meshes are seen.
+void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
+// The fractions, less what meshes hide.
+Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Buffer& light_masks,
+                    const Image& fractions, const ShadowPush& push);
 
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);

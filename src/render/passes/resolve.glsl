@@ -51,7 +51,7 @@ void main() {
     int slot = int(seen.y & 0x0fffffffu);
     float t = uintBitsToFloat(seen.x);
     if (state == kSeenInstance) return;  // resolve_instances.comp's
-    if (state == kSeenNothing) {
+    if (state == kSeenNothing || state == kSeenMesh) {  // meshes: mesh_resolve fills them in
         imageStore(visibility_now, pixel, seen);
         imageStore(surface_words, pixel, uvec4(0u));
         imageStore(depth, pixel, vec4(uintBitsToFloat(0x7f800000u)));

@@ -33,6 +33,8 @@ VkFormat to_vk(Format format) {
         return VK_FORMAT_B10G11R11_UFLOAT_PACK32;
     case Format::Depth32Float:
         return VK_FORMAT_D32_SFLOAT;
+    case Format::Rgba8Srgb:
+        return VK_FORMAT_R8G8B8A8_SRGB;
     }
     return VK_FORMAT_UNDEFINED;
 }

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: MIT
+// What tinygltf throws ends here.
+
+#define TINYGLTF_IMPLEMENTATION
+#include "model/gltf_file.h"
+
+#include "base/format.h"
+
+#include <algorithm>
+
+namespace kiln::model {
+namespace {
+
+// Keeps an image as the file has it: `image.image` holds the PNG's or JPEG's bytes.
+bool keep_bytes(tinygltf::Image* image, const int, std::string*, std::string*, int, int, const unsigned char* bytes,
+                int size, void*) {
+    image->image.assign(bytes, bytes + std::max(size, 0));
+    return true;
+}
+
+}  // namespace
+
+Error gltf_fault(const std::string& name, const std::string& what) {
+    return {name + ": refers to " + what + "; the file is damaged, export it again", ErrorKind::Input};
+}
+
+Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& name, const std::string& folder) {
+    const auto unreadable = [&](std::string_view why) {
+        return Error{formatted("{}: not a glTF file that can be read: {}; export it again", name, why),
+                     ErrorKind::Input};
+    };
+    try {
+        tinygltf::Model model;
+        tinygltf::TinyGLTF loader;
+        loader.SetImageLoader(keep_bytes, nullptr);
+        std::string why, warning;
+        if (bytes.size() > (size_t(1) << 31))
+            return Error{name + ": larger than 2 GiB; split the model", ErrorKind::Input};
+        const auto size = unsigned(bytes.size());
+        const bool read =
+            bytes.starts_with("glTF")
+                ? loader.LoadBinaryFromMemory(&model, &why, &warning,
+                                              reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
+                : loader.LoadASCIIFromString(&model, &why, &warning, bytes.data(), size, folder);
+        if (!read) {
+            for (char& c : why) c = c == '\n' ? ' ' : c;
+            while (why.ends_with(' ')) why.pop_back();
+            return unreadable(why);
+        }
+        return model;
+    } catch (const std::bad_alloc&) {
+        return Error{name + ": not enough memory for it; simplify the model", ErrorKind::OutOfMemory};
+    } catch (const std::exception& e) {
+        return unreadable(e.what());
+    }
+}
+
+Result<AccessorBytes> accessor_bytes(const tinygltf::Model& model, const tinygltf::Accessor& a, size_t element,
+                                     const std::string& name) {
+    AccessorBytes out;
+    out.count = a.count;
+    if (a.sparse.isSparse)
+        return Error{name + ": has sparse accessors, which are not read; export it without them", ErrorKind::Input};
+    if (a.bufferView < 0 || size_t(a.bufferView) >= model.bufferViews.size())
+        return gltf_fault(name, "a buffer view that does not exist");
+    const tinygltf::BufferView& view = model.bufferViews[size_t(a.bufferView)];
+    if (view.buffer < 0 || size_t(view.buffer) >= model.buffers.size())
+        return gltf_fault(name, "a buffer that does not exist");
+    const std::vector<unsigned char>& data = model.buffers[size_t(view.buffer)].data;
+    out.stride = view.byteStride != 0 ? view.byteStride : element;
+    const size_t limit = data.size();
+    if (view.byteOffset > limit || a.byteOffset > limit || a.count > limit || out.stride > limit)
+        return gltf_fault(name, "bytes outside its buffer");
+    const size_t from = view.byteOffset + a.byteOffset;
+    if (a.count > 0 && (from > limit || (a.count - 1) > (limit - from) / out.stride ||
+                        (a.count - 1) * out.stride + element > limit - from))
+        return gltf_fault(name, "bytes outside its buffer");
+    out.at = data.data() + from;
+    return out;
+}
+
+Matrix node_matrix(const tinygltf::Node& node) {
+    if (node.matrix.size() == 16) {
+        Matrix out;
+        std::copy(node.matrix.begin(), node.matrix.end(), out.begin());
+        return out;
+    }
+    double t[3] = {0, 0, 0}, q[4] = {0, 0, 0, 1}, s[3] = {1, 1, 1};
+    if (node.translation.size() == 3) std::copy(node.translation.begin(), node.translation.end(), t);
+    if (node.rotation.size() == 4) std::copy(node.rotation.begin(), node.rotation.end(), q);
+    if (node.scale.size() == 3) std::copy(node.scale.begin(), node.scale.end(), s);
+    return matrix_of(t, q, s);
+}
+
+}  // namespace kiln::model

@@ -1,0 +1,325 @@
+// SPDX-License-Identifier: MIT
+#include "render/gpu_meshes.h"
+
+#include "base/format.h"
+#include "base/log.h"
+#include "render/lib/octahedral.gpu.h"
+#include "render/texture_pages.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+
+namespace kiln::render {
+namespace {
+
+using model::Drawable;
+using model::Matrix;
+using model::Primitive;
+
+static_assert(sizeof(model::BvhNode) == sizeof(MeshNode));
+
+uint32_t unorm16(float a, float b) {
+    const auto word = [](float v) { return uint32_t(std::lround(std::clamp(v, 0.0f, 1.0f) * 65535)); };
+    return word(a) | word(b) << 16;
+}
+
+MeshVertex packed(const model::Vertex& v) {
+    const uint32_t tangent = shade::pack_unit({v.tangent.x, v.tangent.y, v.tangent.z});
+    return {v.position.x,
+            v.position.y,
+            v.position.z,
+            shade::pack_unit(v.normal),
+            (tangent & ~1u) | (v.tangent.w < 0 ? 1u : 0u),
+            unorm16(v.color.x, v.color.y),
+            unorm16(v.color.z, v.color.w),
+            v.uv[0].x,
+            v.uv[0].y,
+            v.uv[1].x,
+            v.uv[1].y};
+}
+
+MeshNode packed(const model::BvhNode& n) {
+    return {n.min.x, n.min.y, n.min.z, n.skip, n.max.x, n.max.y, n.max.z, n.leaf};
+}
+
+vec4 row(const Matrix& m, size_t r) { return {float(m[r]), float(m[4 + r]), float(m[8 + r]), float(m[12 + r])}; }
+
+// False where all of the box is outside one side of the picture, or behind the eye.
+bool may_be_seen(const Box3& box, dvec3 eye, const shade::CameraParams& camera) {
+    const auto dotted = [](const vec4& a, dvec3 b) {
+        return double(a.x) * b.x + double(a.y) * b.y + double(a.z) * b.z;
+    };
+    const double wide = dotted(camera.right, {camera.right.x, camera.right.y, camera.right.z}),
+                 high = dotted(camera.up, {camera.up.x, camera.up.y, camera.up.z});
+    bool outside[5] = {true, true, true, true, true};
+    for (int corner = 0; corner < 8; ++corner) {
+        const dvec3 p{double(corner & 1 ? box.max.x : box.min.x) - eye.x,
+                      double(corner & 2 ? box.max.y : box.min.y) - eye.y,
+                      double(corner & 4 ? box.max.z : box.min.z) - eye.z};
+        // Half a thousandth of the picture more than it shows.
+        const double ahead = dotted(camera.forward, p), edge = ahead + 5e-4 * std::fabs(ahead);
+        const double x = dotted(camera.right, p) / wide, y = dotted(camera.up, p) / high;
+        const bool out[5] = {x > edge, x<-edge, y> edge, y < -edge, ahead <= 0};
+        for (size_t i = 0; i < 5; ++i) outside[i] = outside[i] && out[i];
+    }
+    return std::none_of(std::begin(outside), std::end(outside), [](bool all) { return all; });
+}
+
+}  // namespace
+
+GpuMeshes::~GpuMeshes() { let_go(); }
+
+void GpuMeshes::let_go() {
+    for (rhi::BufferHandle* buffer : {&corners_, &vertices_, &surfaces_, &nodes_}) {
+        if (!*buffer) continue;
+        runner_->forget(*buffer);
+        runner_->device().destroy(*buffer);
+        *buffer = {};
+    }
+    for (rhi::TextureHandle& page : pages_) {
+        if (!page) continue;
+        runner_->forget(page);
+        runner_->device().destroy(page);
+        page = {};
+    }
+    models_.clear();
+}
+
+Result<void> GpuMeshes::bring_page(size_t page, rhi::Extent size, const std::vector<std::vector<uint8_t>>& layers) {
+    rhi::Device& device = runner_->device();
+    const bool srgb = page < kMeshPages;
+    const uint32_t mips = uint32_t(std::bit_width(std::max(size.width, size.height)));
+    auto texture = device.create_texture({.dimension = rhi::Dimension::D2Array,
+                                          .format = srgb ? rhi::Format::Rgba8Srgb : rhi::Format::Rgba8Unorm,
+                                          .size = size,
+                                          .mips = mips,
+                                          .usage = rhi::TextureUsage::Sampled | rhi::TextureUsage::CopyDst,
+                                          .label = "mesh textures"});
+    if (!texture) return texture.error();
+    pages_[page] = *texture;
+    const std::vector<uint8_t> white(size_t{size.width} * size.height * 4, 255);
+    for (uint32_t layer = 0; layer < size.depth; ++layer) {
+        std::vector<uint8_t> level = layer < layers.size() ? layers[layer] : white;
+        rhi::Extent at{size.width, size.height, 1};
+        for (uint32_t mip = 0; mip < mips; ++mip) {
+            if (auto ok = device.write_texture(
+                    {.place = {.texture = *texture, .mip = mip, .origin = {0, 0, layer}}, .size = at},
+                    std::as_bytes(std::span(level)));
+                !ok)
+                return ok;
+            if (mip + 1 == mips) break;
+            level = half_sized(level, at, srgb);
+            at = {std::max(at.width / 2, 1u), std::max(at.height / 2, 1u), 1};
+        }
+    }
+    runner_->set_access(*texture, rhi::Access::SampledReadCompute);
+    return {};
+}
+
+Result<void> GpuMeshes::bring_textures(const MeshSet& set, std::vector<MeshSurface>& surfaces) {
+    std::vector<PagedTexture> textures;
+    std::map<std::tuple<size_t, int32_t, bool>, size_t> numbers;  // model, image, colour
+    const auto number = [&](size_t model, const model::TextureUse& use, bool srgb) {
+        const model::Image& image = set.models[model]->images[size_t(use.image)];
+        const auto [known, fresh] = numbers.emplace(std::tuple(model, use.image, srgb), textures.size());
+        if (fresh) textures.push_back({image.width, image.height, image.rgba.data(), srgb});
+        return known->second;
+    };
+    const auto each = [&](const auto& visit) {
+        for (size_t m = 0; m < set.models.size(); ++m) {
+            for (size_t s = 0; s < set.models[m]->surfaces.size(); ++s) {
+                const model::Surface& in = set.models[m]->surfaces[s];
+                MeshSurface& out = surfaces[places_[m].first_surface + s];
+                visit(m, in.base_texture, out.base, true);
+                visit(m, in.rough_metal_texture, out.rough_metal, false);
+                visit(m, in.normal_texture, out.bumps, false);
+                visit(m, in.occlusion_texture, out.occlusion, false);
+                visit(m, in.emissive_texture, out.glow, true);
+            }
+        }
+    };
+    each([&](size_t m, const model::TextureUse& use, MeshTexture&, bool srgb) {
+        if (use.image >= 0) number(m, use, srgb);
+    });
+    const std::vector<rhi::Extent> sizes = assign_pages(textures);
+    size_t refused = 0;
+    for (const PagedTexture& t : textures) refused += t.page < 0;
+    if (refused > 0) log::warn("{} textures of meshes found no room and are drawn as white", refused);
+    each([&](size_t m, const model::TextureUse& use, MeshTexture& out, bool srgb) {
+        if (use.image < 0) return;
+        const PagedTexture& t = textures[number(m, use, srgb)];
+        if (t.page < 0) return;
+        out = {t.layer | uint32_t(t.page) << kTexturePageShift | (use.uv_set ? kTextureSet1 : 0u) |
+                   uint32_t(use.wrap_u) << kTextureWrapU | uint32_t(use.wrap_v) << kTextureWrapV |
+                   (use.nearest ? kTextureNearest : 0u) | kTextureIs,
+               use.map[0],
+               use.map[1],
+               use.map[2],
+               use.map[3],
+               use.map[4],
+               use.map[5]};
+    });
+    for (size_t page = 0; page < sizes.size(); ++page) {
+        std::vector<std::vector<uint8_t>> layers;
+        for (const PagedTexture& t : textures)
+            if (t.page == int(page)) layers.push_back(resized(t, sizes[page]));
+        if (auto ok = bring_page(page, sizes[page], layers); !ok) return ok;
+    }
+    return {};
+}
+
+Result<void> GpuMeshes::bring(const MeshSet& set) {
+    let_go();
+    places_.clear();
+    std::vector<MeshVertex> vertices;
+    std::vector<uint32_t> corners;
+    std::vector<MeshNode> nodes(top_nodes_);
+    std::vector<MeshSurface> surfaces;
+    uint64_t vertex_count = set.moved.size(), corner_count = 0;
+    for (const auto& d : set.models) vertex_count += d->vertices.size(), corner_count += d->indices.size();
+    const uint64_t most = runner_->device().limits().max_storage_binding;
+    if (vertex_count * sizeof(MeshVertex) > most || corner_count * 4 > most)
+        return Error{formatted("the scene's meshes have {} vertices and {} triangles; this device holds at most {} "
+                               "bytes of either; simplify "
+                               "them",
+                               vertex_count, corner_count / 3, most),
+                     ErrorKind::Input};
+    vertices.reserve(vertex_count);
+    corners.reserve(corner_count);
+    for (const auto& d : set.models) {
+        places_.push_back(
+            {uint32_t(vertices.size()), uint32_t(corners.size()), uint32_t(nodes.size()), uint32_t(surfaces.size())});
+        for (const model::Vertex& v : d->vertices) vertices.push_back(packed(v));
+        corners.insert(corners.end(), d->indices.begin(), d->indices.end());
+        for (const model::BvhNode& n : d->bvh) nodes.push_back(packed(n));
+        for (const model::Surface& s : d->surfaces) {
+            MeshSurface& out = surfaces.emplace_back();
+            out.base_red = s.base_color.x, out.base_green = s.base_color.y, out.base_blue = s.base_color.z;
+            out.alpha = s.base_color.w;
+            out.emissive_red = s.emissive.x, out.emissive_green = s.emissive.y, out.emissive_blue = s.emissive.z;
+            out.metallic = s.metallic, out.roughness = s.roughness;
+            out.normal_scale = s.normal_scale, out.occlusion_strength = s.occlusion_strength;
+            out.alpha_cutoff = s.alpha_cutoff;
+        }
+    }
+    first_moved_vertex_ = uint32_t(vertices.size());
+    first_moved_node_ = uint32_t(nodes.size());
+    moved_vertices_ = uint32_t(set.moved.size());
+    moved_nodes_ = uint32_t(set.moved_nodes.size());
+    vertices.resize(vertices.size() + moved_vertices_);
+    nodes.resize(nodes.size() + moved_nodes_);
+    if (auto ok = bring_textures(set, surfaces); !ok) return ok;
+    const auto make = [&](rhi::BufferHandle& to, std::span<const std::byte> bytes,
+                          std::string_view label) -> Result<void> {
+        auto buffer = runner_->device().create_buffer({.size = bytes.size(), .label = label});
+        if (!buffer) return buffer.error();
+        to = *buffer;
+        return runner_->device().write_buffer(to, 0, bytes);
+    };
+    if (auto ok = make(vertices_, std::as_bytes(std::span(vertices)), "mesh vertices"); !ok) return ok;
+    if (auto ok = make(corners_, std::as_bytes(std::span(corners)), "mesh corners"); !ok) return ok;
+    if (auto ok = make(surfaces_, std::as_bytes(std::span(surfaces)), "mesh surfaces"); !ok) return ok;
+    if (auto ok = make(nodes_, std::as_bytes(std::span(nodes)), "mesh boxes"); !ok) return ok;
+    models_ = set.models;
+    return {};
+}
+
+Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& camera) {
+    parts_.clear();
+    clusters_.clear();
+    one_sided_ = double_sided_ = masked_ = 0;
+    triangles_ = triangles_drawn_ = 0;
+    if (frame.meshes.empty()) return {};
+    const MeshSet set = make_mesh_set(frame);
+    if (set.empty()) return {};
+    if (set.models != models_ || set.tree.size() > top_nodes_ || set.moved.size() != moved_vertices_ ||
+        set.moved_nodes.size() != moved_nodes_) {
+        top_nodes_ = std::bit_ceil(uint32_t(set.tree.size()));
+        if (auto ok = bring(set); !ok) {
+            let_go();
+            return ok;
+        }
+    }
+    // The eye becomes the origin.
+    const dvec3 eye{frame.camera.position.x, frame.camera.position.y, frame.camera.position.z};
+    std::vector<MeshNode> top;
+    for (const model::BvhNode& n : set.tree) {
+        MeshNode out = packed(n);
+        const auto low = [](double v) { return std::nextafter(float(v), -INFINITY); };
+        const auto high = [](double v) { return std::nextafter(float(v), INFINITY); };
+        out.min_x = low(n.min.x - eye.x), out.min_y = low(n.min.y - eye.y), out.min_z = low(n.min.z - eye.z);
+        out.max_x = high(n.max.x - eye.x), out.max_y = high(n.max.y - eye.y), out.max_z = high(n.max.z - eye.z);
+        top.push_back(out);
+    }
+    rhi::Device& device = runner_->device();
+    if (auto ok = device.write_buffer(nodes_, 0, std::as_bytes(std::span(top))); !ok) return ok;
+    if (moved_vertices_ > 0) {
+        std::vector<MeshVertex> vertices;
+        for (const model::Vertex& v : set.moved) vertices.push_back(packed(v));
+        std::vector<MeshNode> nodes;
+        for (const model::BvhNode& n : set.moved_nodes) nodes.push_back(packed(n));
+        if (auto ok = device.write_buffer(vertices_, uint64_t{first_moved_vertex_} * sizeof(MeshVertex),
+                                          std::as_bytes(std::span(vertices)));
+            !ok)
+            return ok;
+        if (auto ok = device.write_buffer(nodes_, uint64_t{first_moved_node_} * sizeof(MeshNode),
+                                          std::as_bytes(std::span(nodes)));
+            !ok)
+            return ok;
+    }
+    for (const MeshSet::Part& part : set.parts) {
+        const Primitive& p = set.primitive(part);
+        const Model& at = places_[part.model];
+        Matrix place = part.place, before = part.before;
+        for (Matrix* m : {&place, &before}) (*m)[12] -= eye.x, (*m)[13] -= eye.y, (*m)[14] -= eye.z;
+        const Matrix back = model::inverse(place);
+        const model::Surface& surface = set.drawable(part).surfaces[p.surface];
+        const bool moved = part.first_moved != UINT32_MAX;
+        parts_.push_back(
+            {row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2), row(back, 0),
+             row(back, 1), row(back, 2), at.first_surface + p.surface, (at.first_corner + p.first_index) / 3,
+             moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
+             moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
+             (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u), p.index_count / 3, 0});
+        triangles_ += p.index_count / 3;
+    }
+    std::vector<bool> in_sight;
+    for (const MeshSet::Part& part : set.parts) in_sight.push_back(may_be_seen(part.bounds, eye, camera));
+    for (size_t i = 0; i < parts_.size(); ++i)
+        if (in_sight[i]) triangles_drawn_ += parts_[i].triangle_count;
+    const auto list = [&](uint32_t& count, bool holes, bool both) {
+        for (uint32_t i = 0; i < parts_.size(); ++i) {
+            if (!in_sight[i]) continue;
+            const bool masked = (parts_[i].flags & kMeshMask) != 0, two = (parts_[i].flags & kMeshDoubleSided) != 0;
+            if (masked != holes || (!holes && two != both)) continue;
+            for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++count) clusters_.push_back({i, t});
+        }
+    };
+    list(one_sided_, false, false);
+    list(double_sided_, false, true);
+    list(masked_, true, true);
+    return {};
+}
+
+MeshHandles GpuMeshes::import(Graph& g) const {
+    MeshHandles out;
+    if (empty()) return out;
+    // Buffers have a size: where nothing is in sight, one cluster that is not drawn.
+    const MeshClusterRef none{};
+    out.clusters = g.upload("mesh clusters", clusters_.empty() ? std::span(&none, 1) : std::span(clusters_));
+    out.parts = g.upload("mesh parts", std::span(parts_));
+    out.corners = g.import("mesh corners", corners_);
+    out.vertices = g.import("mesh vertices", vertices_);
+    out.surfaces = g.import("mesh surfaces", surfaces_);
+    out.nodes = g.import("mesh boxes", nodes_);
+    for (size_t page = 0; page < pages_.size(); ++page)
+        out.pages[page] = g.import(formatted("mesh textures {}", page), pages_[page]);
+    out.one_sided = one_sided_;
+    out.double_sided = double_sided_;
+    out.masked = masked_;
+    return out;
+}
+
+}  // namespace kiln::render

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: MIT
+// Meshes in a frame: the rasteriser says which triangle each pixel's ray meets first, mesh_see whether the field is nearer, mesh_resolve what
+// is there, mesh_shadow what meshes hide of the lights.
+#include "render/passes/passes.h"
+
+#include "shaders/mesh_id_frag.spv.h"
+#include "shaders/mesh_id_mask_frag.spv.h"
+#include "shaders/mesh_resolve.spv.h"
+#include "shaders/mesh_see.spv.h"
+#include "shaders/mesh_shadow.spv.h"
+#include "shaders/mesh_vertex_vert.spv.h"
+
+namespace kiln::render {
+
+namespace {
+
+constexpr rhi::ColorTarget kIds[] = {{.format = rhi::Format::Rg32Uint}};
+constexpr rhi::DepthState kDepth{.format = rhi::Format::Depth32Float};
+constexpr rhi::SamplerDesc kTrilinear{.mip = rhi::Filter::Linear, .address = rhi::AddressMode::Repeat};
+
+}  // namespace
+
+const Kernel kMeshSee{"mesh see", kMeshSeeSpv};
+const Kernel kMeshResolve{"mesh resolve", kMeshResolveSpv};
+const Kernel kMeshShadow{"mesh shadow", kMeshShadowSpv};
+const RasterKernel kMeshOneSided{.name = "meshes",
+                                 .vertex = kMeshVertexVertSpv,
+                                 .fragment = kMeshIdFragSpv,
+                                 .colors = kIds,
+                                 .depth = kDepth,
+                                 .cull = rhi::Cull::Back};
+const RasterKernel kMeshDoubleSidedDraw{.name = "meshes, both sides",
+                                        .vertex = kMeshVertexVertSpv,
+                                        .fragment = kMeshIdFragSpv,
+                                        .colors = kIds,
+                                        .depth = kDepth};
+const RasterKernel kMeshMasked{.name = "meshes with holes",
+                               .vertex = kMeshVertexVertSpv,
+                               .fragment = kMeshIdMaskFragSpv,
+                               .colors = kIds,
+                               .depth = kDepth};
+
+Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
+    const MeshHandles& m = in.meshes;
+    Image ids = g.create("mesh ids", {.size = in.size, .format = rhi::Format::Rg32Uint});
+    Image depth = g.create("mesh depth", {.size = in.size, .format = rhi::Format::Depth32Float});
+    rhi::Load load = rhi::Load::Clear;
+    const auto draw = [&](const RasterKernel& kernel, uint32_t first, uint32_t count, bool holes) {
+        if (count == 0) return;
+        const DrawCall call{.vertices = 3 * kMeshCluster, .instances = count};
+        std::vector<Use> uses{g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners),
+                              g.read(m.vertices)};
+        if (holes) {
+            uses.push_back(g.read(m.surfaces));
+            for (const Image& page : m.pages) uses.push_back(g.read(page));
+            uses.push_back(g.sampler(kTrilinear));
+        }
+        g.draw(kernel, {.colors = {{.image = &ids, .load = load}}, .depth = {.image = &depth, .load = load}}, uses,
+               MeshDrawPush{.first = first, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0}, {&call, 1});
+        load = rhi::Load::Load;
+    };
+    draw(kMeshOneSided, 0, m.one_sided, false);
+    draw(kMeshDoubleSidedDraw, m.one_sided, m.double_sided, false);
+    draw(kMeshMasked, m.one_sided + m.double_sided, m.masked, true);
+    if (load == rhi::Load::Clear) g.clear(ids);  // nothing is in sight
+    Image out = g.create("visibility with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    g.dispatch(kMeshSee, in.size,
+               {g.uniform(in.frame), g.read(in.rays), g.read(m.parts), g.read(m.corners), g.read(m.vertices),
+                g.read(visibility), g.read(refined), g.read(ids), g.write(out)});
+    return out;
+}
+
+void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface) {
+    const MeshHandles& m = in.meshes;
+    std::vector<Use> uses{g.uniform(in.frame),  g.read(in.rays),        g.read(m.parts),
+                          g.read(m.corners),    g.read(m.vertices),     g.read(m.surfaces),
+                          g.read(surface.seen), g.write(surface.words), g.write(surface.depth)};
+    for (const Image& page : m.pages) uses.push_back(g.read(page));
+    uses.push_back(g.sampler(kTrilinear));
+    g.dispatch(kMeshResolve, in.size, uses);
+}
+
+Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Buffer& light_masks,
+                    const Image& fractions, const ShadowPush& push) {
+    const MeshHandles& m = in.meshes;
+    Image out = g.create("visible fractions with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    std::vector<Use> uses{g.uniform(in.frame),  g.read(in.rays),       g.read(in.lights),  g.read(m.parts),
+                          g.read(m.corners),    g.read(m.vertices),    g.read(m.surfaces), g.read(m.nodes),
+                          g.read(surface.seen), g.read(surface.words), g.read(fractions),  g.write(out)};
+    for (size_t page = 0; page < kMeshPages; ++page) uses.push_back(g.read(m.pages[page]));
+    uses.push_back(g.sampler(kTrilinear));
+    uses.push_back(g.read(light_masks));
+    g.dispatch(kMeshShadow, in.size, uses, push);
+    return out;
+}
+
+}  // namespace kiln::render
