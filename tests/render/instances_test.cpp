@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Instances against the same solids in the world's list, against rays through their host bricks, and what moving them costs.
 #include "gpu_worlds.h"
+#include "render/temporal.h"
 
 #include "field/brick_set.h"
 #include "field/clipmap.h"
@@ -374,6 +375,57 @@ TEST_F(InstancesGpu, RecordsTakeAPointToWhereItWas) {
         EXPECT_NEAR(inside(record.eye_y, record.y), double(local.y) / voxel, 2e-2 * 0.05 / voxel);
         EXPECT_NEAR(inside(record.eye_z, record.z), double(local.z) / voxel, 2e-2 * 0.05 / voxel);
     }
+}
+
+// The same from the screen: what the motion pass makes of an object that turned and went while the camera stood still.
+TEST_F(InstancesGpu, MotionIsWhereTheSurfaceWasOnTheScreen) {
+    Frame frame = frame_of(on_ground());
+    const Pose now{{0.2f, 0.9f, 0.7f}, axis_angle(normalize(vec3{1, 2, 0.5f}), 0.7f)};
+    const Pose was{{0.05f, 0.85f, 0.6f}, axis_angle(normalize(vec3{1, 2, 0.5f}), 0.4f)};
+    frame.instances = {
+        {.bricks = set_of({edit(Box{.half_extents = {0.5f, 0.3f, 0.4f}})}, 0.04f), .pose = now, .before = was}};
+    GpuField gpu(*runner_);
+    GpuInstances instances(*runner_, gpu);
+    instances.reserve(frame.instances);
+    rhi::must(gpu.update(frame.field, Baker::Host));
+    rhi::must(instances.update(frame.instances));
+    const FrameParams p = rhi::must(frame_params(frame, {.width = 64, .height = 48, .refine = false}, gpu));
+    instances.place(frame.instances, p);
+    Graph g(*runner_);
+    TileInputs in;
+    in.field = gpu.import(g);
+    in.instances = instances.import(g);
+    in.frame = g.block(p);
+    const FrameRay no_ray{};
+    in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
+    in.size = {64, 48};
+    in.motion = g.block(motion_params(frame.camera, frame.camera, 64, 48));
+    Visibility seen = march(g, in);
+    march_instances(g, in, seen);
+    const Readback words = g.readback(seen.words), moved = g.readback(motion(g, in, seen.words));
+    rhi::must(runner_->execute(g));
+    const auto visible = rhi::must(words.get_as<uint32_t>());
+    const auto halves = rhi::must(moved.get_as<uint16_t>());
+    int found = 0;
+    double largest = 0;
+    for (size_t i = 0; i < visible.size(); i += 4) {
+        const double mx = double(float_from_half(halves[i])), my = double(float_from_half(halves[i + 1]));
+        if (visible[i + 1] >> 28 != kSeenInstance) {
+            EXPECT_EQ(std::hypot(mx, my), 0) << "the world stood still";
+            continue;
+        }
+        ++found;
+        const float x = float(i / 4 % 64) + 0.5f, y = float(i / 4 / 64) + 0.5f;
+        const float t = std::bit_cast<float>(visible[i]) * p.grid.voxel_size;
+        const vec3 to = shade::camera_direction_at(p.camera, x, y) * t;
+        const vec3 then = was * (inverse(now) * (frame.camera.position + to)) - frame.camera.position;
+        const vec2 at = shade::camera_pixel(p.camera, then);
+        largest = std::max(largest, std::hypot(mx, my));
+        EXPECT_NEAR(mx, double(at.x - x), 0.01);
+        EXPECT_NEAR(my, double(at.y - y), 0.01);
+    }
+    EXPECT_GT(found, 100);
+    EXPECT_GT(largest, 2);
 }
 
 }  // namespace

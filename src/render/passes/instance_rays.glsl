@@ -22,11 +22,6 @@ TexelRay object_ray(InstanceRecord i, vec3 from, vec3 direction) {
     return texel_ray(ivec3(i.eye_x, i.eye_y, i.eye_z) + ivec3(whole), part - whole, into_object(i, direction));
 }
 
-// Where what is at p (finest voxels from the eye) was one frame before, from this frame's eye.
-vec3 instance_point_before(InstanceRecord i, vec3 p) {
-    return vec3(dot(i.before_x.xyz, p) + i.before_x.w, dot(i.before_y.xyz, p) + i.before_y.w, dot(i.before_z.xyz, p) + i.before_z.w);
-}
-
 // A ray's point at t, in voxels from the object's origin: as exact as floats near `texel` are.
 vec3 brick_point(BrickRay ray, ivec3 texel, float t) {
     float s = t - ray.t_base;

@@ -5,6 +5,8 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
+#include "render/passes/instances.gpu.h"
+#include "render/passes/mesh.gpu.h"
 #include "render/passes/motion.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
@@ -14,6 +16,8 @@ layout(set = 0, binding = 1, std140) uniform Motion { MotionParams cameras; };
 layout(set = 0, binding = 2, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 3) uniform utexture2D visibility;
 layout(set = 0, binding = 4, rgba16f) writeonly uniform image2D motion;
+layout(set = 0, binding = 5, std430) readonly buffer Instances { InstanceRecord instances[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Parts { MeshPart mesh_parts[]; };
 
 #include "render/passes/rays.glsl"
 #include "render/passes/point_before.glsl"
@@ -30,9 +34,8 @@ void main() {
     vec3 before = ray.direction;
     vec3 moved = vec3(0.0);
     if (state != kSeenNothing) {
-        vec3 p_world = seen_point(ray, seen);
-        moved = point_before(state, seen, p_world) - p_world;
         now *= uintBitsToFloat(seen.x) * frame.grid.voxel_size;
+        moved = point_before(state, seen, now) - now;
         before = now + moved + vec3(cameras.moved_x, cameras.moved_y, cameras.moved_z);
     }
     vec2 by = vec2(0.0);
