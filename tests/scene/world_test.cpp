@@ -90,6 +90,23 @@ TEST(World, RefusesWhatTheReaderRefuses) {
     EXPECT_FALSE(world.add(e)) << "names are unique";
 }
 
+TEST(World, FrameHasTheOutlinesOfVisibleEdits) {
+    World world;
+    ASSERT_TRUE(world.add(ball(1)));
+    Edit lined = ball(0.5f, {1, 0, 0}), hidden = lined;
+    lined.outline = Outline{.color = {0, 1, 0}, .width_px = 7};
+    hidden.outline = Outline{};
+    hidden.hidden = true;
+    ASSERT_TRUE(world.add(hidden));
+    ASSERT_TRUE(world.add(lined));
+    const auto frame = world.frame();
+    ASSERT_TRUE(frame);
+    ASSERT_EQ(frame->outlines.size(), 1u);
+    EXPECT_EQ(frame->outlines[0].outline, *lined.outline);
+    const sdf::EditSpan& row = frame->field->program().edits[frame->outlines[0].row];
+    EXPECT_NEAR(row.bounds.center().x, 1, 1e-6);
+}
+
 TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
     World world;
     world.field_settings = {
