@@ -22,8 +22,6 @@ Result<std::shared_ptr<const sdf::Program>> program_of(World::Impl& world, std::
 
 }  // namespace
 
-physics::Pose frame_of(const Edit& first) { return {first.node.transform.position, first.node.transform.rotation}; }
-
 std::optional<physics::Convex> convex_of(std::span<const Edit> edits) {
     if (edits.size() != 1) return std::nullopt;
     const Edit& e = edits[0];
@@ -46,20 +44,6 @@ std::optional<physics::Convex> convex_of(std::span<const Edit> edits) {
     default:
         return std::nullopt;
     }
-}
-
-std::vector<Edit> in_frame(std::vector<Edit> edits) {
-    const physics::Pose local = inverse(frame_of(edits.front()));
-    for (Edit& e : edits) {
-        Transform& t = e.node.transform;
-        const physics::Pose moved = local * physics::Pose{t.position, t.rotation};
-        t.position = moved.position;
-        t.rotation = moved.rotation;
-    }
-    edits.front().node.transform.position = {};
-    edits.front().node.transform.rotation = {};
-    edits.front().op = Op::Union;
-    return edits;
 }
 
 std::vector<Edit> ground_of(const World::Impl& world, const std::unordered_set<std::string>& owned) {

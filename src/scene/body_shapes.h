@@ -5,6 +5,7 @@
 
 #include "field/sdf_field.h"
 #include "physics/physics.h"
+#include "scene/movers.h"
 #include "scene/world_impl.h"
 
 #include <memory>
@@ -16,10 +17,6 @@
 
 namespace kiln::scene {
 
-/// Of a body: its first edit's, without scale.
-physics::Pose frame_of(const Edit& first);
-/// The edits of a body in its frame, the first as a union.
-std::vector<Edit> in_frame(std::vector<Edit> edits);
 /// The exact convex shape of a body of one edit, where it has one.
 std::optional<physics::Convex> convex_of(std::span<const Edit> edits);
 /// The world's list without the edits of bodies.

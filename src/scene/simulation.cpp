@@ -114,7 +114,7 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
             edits.push_back(*impl.edits[slot].edit);
         }
         const physics::Pose frame = frame_of(edits.front());
-        edits = in_frame(std::move(edits));
+        edits = in_frame_of_first(std::move(edits));
         physics::BodySettings s{.motion = physics::Motion(body.motion),
                                 .pose = frame,
                                 .density = body.numbers.density,
