@@ -8,6 +8,7 @@
 #include "model/triangles.h"
 
 #include "base/format.h"
+#include "image/jpeg_file.h"
 #include "image/png_file.h"
 
 #include <algorithm>
@@ -68,12 +69,13 @@ private:
                 left_out("is missing; put it beside the model");
                 continue;
             }
-            if (in.image.size() < 4 || std::memcmp(in.image.data(), kPng, 4) != 0) {
-                left_out(formatted("is not a PNG image{}; convert it",
+            const bool png = in.image.size() >= 4 && std::memcmp(in.image.data(), kPng, 4) == 0;
+            if (!png && !image::is_jpeg(bytes)) {
+                left_out(formatted("is neither a PNG nor a JPEG image{}; convert it",
                                    in.mimeType.empty() ? "" : formatted(" but {}", in.mimeType)));
                 continue;
             }
-            auto pixels = image::decode_png(bytes, out.name);
+            auto pixels = png ? image::decode_png(bytes, out.name) : image::decode_jpeg(bytes, out.name);
             if (!pixels) {
                 left_out(pixels.error().message);
                 continue;

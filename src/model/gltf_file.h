@@ -10,7 +10,7 @@
 #include <string>
 #include <string_view>
 
-// Images stay as bytes: image/png_file.h decodes them.
+// Images stay as bytes: image/png_file.h and jpeg_file.h decode them.
 #define TINYGLTF_NO_STB_IMAGE
 #define TINYGLTF_NO_STB_IMAGE_WRITE
 #include <tiny_gltf.h>

@@ -2,6 +2,7 @@
 #include "model/drawable.h"
 
 #include "glb.h"
+#include "image/jpeg_bytes.h"
 #include "model/triangles.h"
 
 #include <gmock/gmock.h>
@@ -242,16 +243,40 @@ TEST(Drawable, EveryBrokenReferenceIsOneErrorThatNamesTheElement) {
 
 TEST(Drawable, AnImageOfAnotherKindIsANoteAndTheRestIsDrawn) {
     SquareGlb g;
-    const std::string jpeg = "\xff\xd8\xff\xe0 no picture";
-    const int view = g.add_bytes(std::as_bytes(std::span(jpeg)));
+    const std::string webp = "RIFF....WEBP";
+    const int view = g.add_bytes(std::as_bytes(std::span(webp)));
     g.material = ",\"material\":0";
     g.materials = "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}";
-    g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/jpeg\",\"bufferView\":" +
+    g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/webp\",\"bufferView\":" +
              std::to_string(view) + "}]";
     const Drawable d = good(g.whole());
     ASSERT_EQ(d.notes.size(), 1u);
-    EXPECT_THAT(d.notes[0], HasSubstr("images[0] of m.glb: is not a PNG image but image/jpeg"));
+    EXPECT_THAT(d.notes[0], HasSubstr("images[0] of m.glb: is neither a PNG nor a JPEG image but image/webp"));
     EXPECT_EQ(d.surfaces[0].base_texture.image, -1);
+}
+
+TEST(Drawable, AJpegIsATextureAndABrokenOneANote) {
+    const auto drawn = [](std::span<const std::byte> jpeg) {
+        SquareGlb g;
+        const int view = g.add_bytes(jpeg);
+        g.material = ",\"material\":0";
+        g.materials = "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}";
+        g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/jpeg\",\"bufferView\":" +
+                 std::to_string(view) + "}]";
+        return good(g.whole());
+    };
+    const std::vector<std::byte> jpeg = image::jpeg_bytes(16, 8, 3, true);
+    const Drawable whole = drawn(jpeg), broken = drawn(std::span(jpeg).first(jpeg.size() / 2));
+    EXPECT_THAT(whole.notes, testing::IsEmpty());
+    ASSERT_EQ(whole.surfaces[0].base_texture.image, 0);
+    ASSERT_EQ(whole.images[0].width, 16);
+    ASSERT_EQ(whole.images[0].height, 8);
+    for (size_t c = 0; c < 3; ++c)
+        EXPECT_NEAR(int(whole.images[0].rgba[4 * (3 * 16 + 5) + c]), int(image::jpeg_value(5, 3, int(c))), 12);
+    EXPECT_EQ(whole.images[0].rgba[3], 255);
+    ASSERT_EQ(broken.notes.size(), 1u);
+    EXPECT_THAT(broken.notes[0], HasSubstr("broken JPEG"));
+    EXPECT_EQ(broken.surfaces[0].base_texture.image, -1);
 }
 
 // Mutated files: a drawable whose numbers are all in range, or one error. Never a crash.
