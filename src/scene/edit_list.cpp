@@ -55,6 +55,7 @@ void EditList::insert(EditId id, std::unique_ptr<Edit> edit, uint32_t before, Js
     const bool fresh = names_.emplace(s.edit->name, id.index).second;
     KILN_ASSERT(fresh, "two edits named {}", s.edit->name);
     link(id.index, before);
+    outlined_ += s.edit->outline.has_value();
     ++size_;
 }
 
@@ -68,6 +69,7 @@ std::unique_ptr<Edit> EditList::erase(uint32_t slot) {
     s.next = free_;
     if (free_ != kNone) slots_[free_].previous = slot;
     free_ = slot;
+    outlined_ -= s.edit->outline.has_value();
     --size_;
     return std::move(s.edit);
 }
@@ -78,6 +80,8 @@ std::unique_ptr<Edit> EditList::exchange(uint32_t slot, std::unique_ptr<Edit> ed
     node.key() = edit->name;
     const bool fresh = names_.insert(std::move(node)).inserted;
     KILN_ASSERT(fresh, "two edits named {}", edit->name);
+    outlined_ += edit->outline.has_value();
+    outlined_ -= s.edit->outline.has_value();
     return std::exchange(s.edit, std::move(edit));
 }
 

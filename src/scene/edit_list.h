@@ -30,6 +30,7 @@ public:
     };
 
     uint32_t size() const { return size_; }
+    uint32_t outlined() const { return outlined_; }  ///< edits with an outline
     uint32_t first() const { return first_; }
     uint32_t last() const { return last_; }
     const Slot& operator[](uint32_t slot) const { return slots_[slot]; }
@@ -71,7 +72,7 @@ private:
     void take_free(uint32_t slot);
 
     std::vector<Slot> slots_;
-    uint32_t first_ = kNone, last_ = kNone, free_ = kNone, size_ = 0;
+    uint32_t first_ = kNone, last_ = kNone, free_ = kNone, size_ = 0, outlined_ = 0;
     std::unordered_map<std::string_view, uint32_t> names_;  // views of the edits' own names
 };
 

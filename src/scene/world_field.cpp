@@ -319,10 +319,12 @@ Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) cons
     out.materials.reserve(impl_->data.materials.size() + 1);
     out.materials.emplace_back();  // sdf::kDefaultMaterial
     for (const auto& [name, material] : impl_->data.materials) out.materials.push_back(material);
-    impl_->edits.each([&](uint32_t slot) {
-        const Edit& e = *impl_->edits[slot].edit;
-        if (e.outline && !e.hidden) out.outlines.push_back({impl_->edits[slot].row, *e.outline});
-    });
+    if (impl_->edits.outlined() > 0) {
+        impl_->edits.each([&](uint32_t slot) {
+            const Edit& e = *impl_->edits[slot].edit;
+            if (e.outline && !e.hidden) out.outlines.push_back({impl_->edits[slot].row, *e.outline});
+        });
+    }
     out.meshes = impl_->meshes.instances(impl_->data);
     out.lights = lights;
     out.environment = environment;

@@ -97,14 +97,24 @@ TEST(World, FrameHasTheOutlinesOfVisibleEdits) {
     lined.outline = Outline{.color = {0, 1, 0}, .width_px = 7};
     hidden.outline = Outline{};
     hidden.hidden = true;
-    ASSERT_TRUE(world.add(hidden));
-    ASSERT_TRUE(world.add(lined));
+    const auto out_of_sight = world.add(hidden), id = world.add(lined);
+    ASSERT_TRUE(out_of_sight && id);
     const auto frame = world.frame();
     ASSERT_TRUE(frame);
     ASSERT_EQ(frame->outlines.size(), 1u);
     EXPECT_EQ(frame->outlines[0].outline, *lined.outline);
     const sdf::EditSpan& row = frame->field->program().edits[frame->outlines[0].row];
     EXPECT_NEAR(row.bounds.center().x, 1, 1e-6);
+    // And of the ones that changed, came and went since.
+    ASSERT_TRUE(world.remove(*out_of_sight));
+    lined.outline.reset();
+    ASSERT_TRUE(world.change(*id, lined));
+    EXPECT_TRUE(world.frame()->outlines.empty());
+    lined.outline = Outline{};
+    ASSERT_TRUE(world.change(*id, lined));
+    EXPECT_EQ(world.frame()->outlines.size(), 1u);
+    ASSERT_TRUE(world.remove(*id));
+    EXPECT_TRUE(world.frame()->outlines.empty());
 }
 
 TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
