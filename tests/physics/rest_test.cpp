@@ -224,7 +224,7 @@ TEST(SlowPhysics, APileOfFortyFieldToriSettlesWithoutSinkingIn) {
             s.world->step(kStep);
             deepest = std::max(deepest, s.deepest());
         }
-        EXPECT_LT(deepest, 0.04f) << engine;
+        EXPECT_LT(deepest, 0.03f) << engine;
         for (const BodyId id : ids) {
             const float y = s.world->state(id).pose.position.y;
             EXPECT_GT(y, 0.05f) << engine;

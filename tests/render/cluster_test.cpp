@@ -82,7 +82,7 @@ TEST_F(ClusterGpu, TheLastOfManyLightsStillShines) {
     EXPECT_EQ(lit.rgba, alone.rgba);
 }
 
-struct Masks : GpuTest {
+struct MasksGpu : GpuTest {
     // Words of the tiles of a wall at z = 0 that fills a picture of 64 x 32 pixels, a voxel each, seen straight on.
     std::vector<uint32_t> of(const std::vector<Light>& lights) {
         FrameParams p{};
@@ -124,7 +124,7 @@ struct Masks : GpuTest {
     }
 };
 
-TEST_F(Masks, ALightIsInTheTilesThatItReachesAndNoOthers) {
+TEST_F(MasksGpu, ALightIsInTheTilesThatItReachesAndNoOthers) {
     // Tiles are a metre wide; the points of tile (i, j) are from (i, j) to (i + 15/16, j + 15/16).
     const auto lamp = [](vec3 at, float range) {
         return Light{.kind = Light::Kind::Point, .position = at, .range = range};

@@ -130,11 +130,11 @@ public:
         // iterations, makes a stack of ten boxes sway more and more.
         solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
         solver.m_numIterations = 40;
-        // An island ends its iterations when the last one changed velocities by less than 3 mm/s in all.
-        solver.m_minimumSolverBatchSize = 1;
-        solver.m_leastSquaresResidualThreshold = 1e-5f;
         dynamics_.setForceUpdateAllAabbs(false);
         solver.m_restitutionVelocityThreshold = 0.5f;
+        // An island ends its iterations when the last one changed velocities by less than 0.3 mm/s in all.
+        solver.m_minimumSolverBatchSize = 1;
+        solver.m_leastSquaresResidualThreshold = 1e-7f;
     }
     ~BulletWorld() override {
         for (auto& o : objects_)
