@@ -48,13 +48,27 @@ BrickField::Table::Table(size_t count) {
 
 BrickField::Table::~Table() {
     const size_t size = size_t(1) << (64 - shift);
-    for (size_t i = 0; i < size; ++i)
+    for (size_t i = 0; i < size; ++i) {
         if (Brick* b = slots[i].brick.load(std::memory_order_relaxed)) let_go(b);
+        if (const SdfField* p = slots[i].part.load(std::memory_order_relaxed); p != &no_part()) delete p;
+    }
 }
 
 BrickField::Brick* BrickField::far_cell() {
     static Brick far{};
     return &far;
+}
+
+// Says that the field is no shorter in a cell than anywhere.
+const SdfField& BrickField::no_part() {
+    struct None final : SdfField {
+        float distance(vec3) const override { return sdf::kEmpty; }
+        float distance(vec3, vec3&) const override { return sdf::kEmpty; }
+        void distances(const sdf::Points&, float*) const override {}
+        Box3 bounds() const override { return {}; }
+    };
+    static const None none;
+    return none;
 }
 
 void BrickField::let_go(Brick* b) {
@@ -144,17 +158,16 @@ bool BrickField::make(ivec3 cell, Brick& out) const {
     return exact_->texels(center, side, options_.near, x, y, z, out.distance.data());
 }
 
-const BrickField::Brick* BrickField::find(uint64_t key, ivec3 cell) const {
+BrickField::Slot* BrickField::find(uint64_t key, ivec3 cell) const {
     const size_t mask = (size_t(1) << (64 - table_.shift)) - 1;
     size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> table_.shift);
-    Slot* place = nullptr;
     for (int probe = 0; probe < kMostProbes; ++probe, at = (at + 1) & mask) {
         Slot& slot = table_.slots[at];
         uint64_t there = slot.key.load(std::memory_order_relaxed);
         if (there == 0) {
             if (bricks_.load(std::memory_order_relaxed) >= options_.most_bricks ||
                 cells_.load(std::memory_order_relaxed) >= room_)
-                break;
+                return nullptr;
             if (slot.key.compare_exchange_strong(there, key, std::memory_order_relaxed)) {
                 cells_.fetch_add(1, std::memory_order_relaxed);
                 there = key;
@@ -163,52 +176,107 @@ const BrickField::Brick* BrickField::find(uint64_t key, ivec3 cell) const {
         if (there != key) continue;
         const uint32_t now = generation_.load(std::memory_order_relaxed);
         if (slot.asked.load(std::memory_order_relaxed) != now) slot.asked.store(now, std::memory_order_relaxed);
-        if (const Brick* b = slot.brick.load(std::memory_order_acquire)) return b;
-        place = &slot;
-        break;
+        if (slot.brick.load(std::memory_order_acquire) != nullptr) return &slot;
+        auto made = std::make_unique<Brick>();
+        Brick* fresh = make(cell, *made) ? made.release() : far_cell();
+        Brick* none = nullptr;
+        if (!slot.brick.compare_exchange_strong(none, fresh, std::memory_order_acq_rel)) {
+            let_go(fresh);  // another thread was first, with the same bits
+        } else if (fresh != far_cell()) {
+            bricks_.fetch_add(1, std::memory_order_relaxed);
+        }
+        return &slot;
     }
-    if (place == nullptr) {  // no room: made for this question alone
-        thread_local Brick scratch;
-        return make(cell, scratch) ? &scratch : far_cell();
-    }
-    auto made = std::make_unique<Brick>();
-    Brick* fresh = make(cell, *made) ? made.release() : far_cell();
-    Brick* none = nullptr;
-    if (place->brick.compare_exchange_strong(none, fresh, std::memory_order_acq_rel)) {
-        if (fresh != far_cell()) bricks_.fetch_add(1, std::memory_order_relaxed);
-        return fresh;
-    }
-    let_go(fresh);  // another thread was first, with the same bits
-    return none;
+    return nullptr;
 }
 
-float BrickField::ask(vec3 p, vec3* gradient, Cursor& cursor) const {
-    const vec3 t = p * voxels_per_metre_;
+const SdfField& BrickField::part(Slot& slot, ivec3 cell) const {
+    const SdfField* p = slot.part.load(std::memory_order_acquire);
+    if (p == nullptr) {
+        const float side = kBrickVoxels * options_.voxel_size;
+        const vec3 low{float(cell.x) * side, float(cell.y) * side, float(cell.z) * side};
+        auto made = exact_->within(low + vec3{side, side, side} * 0.5f, side);
+        const SdfField* fresh = made != nullptr ? made.release() : &no_part();
+        if (slot.part.compare_exchange_strong(p, fresh, std::memory_order_acq_rel)) {
+            p = fresh;
+        } else if (fresh != &no_part()) {
+            delete fresh;  // another thread was first, with the same bits
+        }
+    }
+    return p != &no_part() ? *p : *exact_;
+}
+
+namespace {
+
+struct Place {
+    vec3 t;  // in voxels
+    ivec3 texel, cell;
+    bool near = false;  // enough to the origin for cells
+};
+Place place_of(vec3 p, float voxels_per_metre) {
+    Place out;
+    out.t = p * voxels_per_metre;
     constexpr float kMost = float(kMostCell * kBrickVoxels);
-    if (!(std::abs(t.x) < kMost && std::abs(t.y) < kMost && std::abs(t.z) < kMost))
-        return gradient != nullptr ? exact_->distance(p, *gradient) : exact_->distance(p);
-    const ivec3 texel{floor_of(t.x), floor_of(t.y), floor_of(t.z)};
-    const ivec3 cell{cell_on_axis(texel.x), cell_on_axis(texel.y), cell_on_axis(texel.z)};
-    const uint64_t key = key_of(cell);
-    if (key != cursor.key) cursor = {key, find(key, cell)};
-    const Brick* b = cursor.brick;
-    if (b == far_cell()) return gradient != nullptr ? exact_->distance(p, *gradient) : exact_->distance(p);
-    const ivec3 v{texel.x - cell.x * kBrickVoxels, texel.y - cell.y * kBrickVoxels, texel.z - cell.z * kBrickVoxels};
+    out.near = std::abs(out.t.x) < kMost && std::abs(out.t.y) < kMost && std::abs(out.t.z) < kMost;
+    if (!out.near) return out;
+    out.texel = {floor_of(out.t.x), floor_of(out.t.y), floor_of(out.t.z)};
+    out.cell = {cell_on_axis(out.texel.x), cell_on_axis(out.texel.y), cell_on_axis(out.texel.z)};
+    return out;
+}
+
+}  // namespace
+
+float BrickField::ask(vec3 p, vec3* gradient, Trail& trail) const {
+    const auto by = [&](const SdfField& exact) {
+        return gradient != nullptr ? exact.distance(p, *gradient) : exact.distance(p);
+    };
+    const Place at = place_of(p, voxels_per_metre_);
+    if (!at.near) return by(*exact_);
+    const uint64_t key = key_of(at.cell);
+    if (key != trail.key) trail = {key, find(key, at.cell)};
+    thread_local Brick scratch;
+    const Brick* b = &scratch;
+    if (trail.place != nullptr) {
+        Slot& slot = *static_cast<Slot*>(const_cast<void*>(trail.place));
+        b = slot.brick.load(std::memory_order_acquire);
+        if (b == far_cell()) return by(part(slot, at.cell));
+    } else if (!make(at.cell, scratch)) {  // no room: made for this question alone
+        return by(*exact_);
+    }
+    const ivec3 v{at.texel.x - at.cell.x * kBrickVoxels, at.texel.y - at.cell.y * kBrickVoxels,
+                  at.texel.z - at.cell.z * kBrickVoxels};
     const float* d = b->distance.data() + (size_t(v.z) * 8 + size_t(v.y)) * 8 + size_t(v.x);
     const Corners c{d[0], d[1], d[8], d[9], d[64], d[65], d[72], d[73]};
-    const vec3 at{t.x - float(texel.x), t.y - float(texel.y), t.z - float(texel.z)};
-    if (gradient != nullptr) *gradient = trilinear_gradient(c, at) * voxels_per_metre_;
-    return trilinear_value(c, at);
+    const vec3 in{at.t.x - float(at.texel.x), at.t.y - float(at.texel.y), at.t.z - float(at.texel.z)};
+    if (gradient != nullptr) *gradient = trilinear_gradient(c, in) * voxels_per_metre_;
+    return trilinear_value(c, in);
 }
 
-void BrickField::distances(std::span<const vec3> points, float* out, vec3* gradients) const {
-    Cursor cursor;
-    for (size_t i = 0; i < points.size(); ++i) out[i] = ask(points[i], gradients + i, cursor);
+void BrickField::distances(std::span<const vec3> points, float* out, vec3* gradients, Trail& trail) const {
+    for (size_t i = 0; i < points.size(); ++i) out[i] = ask(points[i], gradients + i, trail);
 }
 
 void BrickField::distances(const sdf::Points& points, float* out) const {
-    Cursor cursor;
-    for (int i = 0; i < points.count; ++i) out[i] = ask({points.x[i], points.y[i], points.z[i]}, nullptr, cursor);
+    Trail trail;
+    for (int i = 0; i < points.count; ++i) out[i] = ask({points.x[i], points.y[i], points.z[i]}, nullptr, trail);
+}
+
+void BrickField::measure(std::span<const vec3> points, float* out, vec3* gradients, Trail& trail) const {
+    for (size_t first = 0; first < points.size();) {
+        // A run of points of one cell.
+        const Place at = place_of(points[first], voxels_per_metre_);
+        size_t last = first + 1;
+        const auto in_cell = [&](const Place& next) { return next.near && next.cell == at.cell; };
+        while (at.near && last < points.size() && in_cell(place_of(points[last], voxels_per_metre_))) ++last;
+        const SdfField* exact = exact_.get();
+        if (at.near) {
+            const uint64_t key = key_of(at.cell);
+            if (key != trail.key) trail = {key, find(key, at.cell)};
+            if (trail.place != nullptr) exact = &part(*static_cast<Slot*>(const_cast<void*>(trail.place)), at.cell);
+        }
+        exact->distances(points.subspan(first, last - first), out + first, gradients + first);
+        first = last;
+    }
 }
 
 }  // namespace kiln::field

@@ -33,9 +33,22 @@ public:
     /// The field of `exact`, whose solid differs from this one's in `changed` only. Keeps the bricks that stay what they were.
     std::shared_ptr<const BrickField> after(std::shared_ptr<const SdfField> exact, const Box3& changed) const;
 
-    float distance(vec3 p) const override { return ask(p, nullptr); }
-    float distance(vec3 p, vec3& gradient) const override { return ask(p, &gradient); }
-    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override;
+    float distance(vec3 p) const override {
+        Trail trail;
+        return ask(p, nullptr, trail);
+    }
+    float distance(vec3 p, vec3& gradient) const override {
+        Trail trail;
+        return ask(p, &gradient, trail);
+    }
+    float distance(vec3 p, vec3& gradient, Trail& trail) const override { return ask(p, &gradient, trail); }
+    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override {
+        Trail trail;
+        distances(points, out, gradients, trail);
+    }
+    void distances(std::span<const vec3> points, float* out, vec3* gradients, Trail& trail) const override;
+    /// The exact field's bits, by the part of it that matters in the cell.
+    void measure(std::span<const vec3> points, float* out, vec3* gradients, Trail& trail) const override;
     void distances(const sdf::Points& points, float* out) const override;
     uint32_t material(vec3 p) const override { return exact_->material(p); }
     Box3 bounds() const override { return exact_->bounds(); }
@@ -65,7 +78,8 @@ private:
     struct Slot {
         std::atomic<uint64_t> key{0};
         std::atomic<Brick*> brick{nullptr};
-        std::atomic<uint32_t> asked{0};  // last generation in which someone did
+        std::atomic<const SdfField*> part{nullptr};  // of the exact field, once somebody measured here
+        std::atomic<uint32_t> asked{0};              // last generation in which someone did
     };
     struct Table {
         explicit Table(size_t slots);
@@ -73,21 +87,15 @@ private:
         std::unique_ptr<Slot[]> slots;
         int shift;
     };
-    // A cell looked at last.
-    struct Cursor {
-        uint64_t key = 0;
-        const Brick* brick = nullptr;
-    };
-
-    float ask(vec3 p, vec3* gradient) const {
-        Cursor cursor;
-        return ask(p, gradient, cursor);
-    }
-    float ask(vec3 p, vec3* gradient, Cursor& cursor) const;
-    const Brick* find(uint64_t key, ivec3 cell) const;
+    float ask(vec3 p, vec3* gradient, Trail& trail) const;
+    /// The slot of a cell, its brick made; null where there is no room for either.
+    Slot* find(uint64_t key, ivec3 cell) const;
+    /// Of the exact field, in a cell.
+    const SdfField& part(Slot& slot, ivec3 cell) const;
     bool make(ivec3 cell, Brick& out) const;
     void adopt(const BrickField& old, const Box3& changed, uint32_t asked_since);
     static Brick* far_cell();
+    static const SdfField& no_part();
     static void let_go(Brick* brick);
 
     std::shared_ptr<const SdfField> exact_;

@@ -35,6 +35,73 @@ float far_distance(const sdf::TapeView& tape, vec3 at, vec3& gradient) {
     return float(d);
 }
 
+// With gradients: each point and its neighbours along the axes, all at once. Rounding is below 4e-6 m near the origin, so slopes over
+// 4e-3 m are right to 1e-3.
+constexpr size_t kStencil = 7, kStencils = 9;
+void ask(const sdf::TapeView& tape, std::span<const vec3> points, float* out, vec3* gradients) {
+    constexpr float h = kFloatStep;
+    for (size_t first = 0; first < points.size();) {
+        if (!near(points[first])) {
+            out[first] = far_distance(tape, points[first], gradients[first]);
+            ++first;
+            continue;
+        }
+        float x[kStencil * kStencils], y[kStencil * kStencils], z[kStencil * kStencils], d[kStencil * kStencils];
+        size_t count = 0;
+        for (; count < kStencils && first + count < points.size() && near(points[first + count]); ++count) {
+            const vec3 p = points[first + count];
+            const float px[kStencil] = {p.x, p.x + h, p.x - h, p.x, p.x, p.x, p.x};
+            const float py[kStencil] = {p.y, p.y, p.y, p.y + h, p.y - h, p.y, p.y};
+            const float pz[kStencil] = {p.z, p.z, p.z, p.z, p.z, p.z + h, p.z - h};
+            std::copy_n(px, kStencil, x + kStencil * count);
+            std::copy_n(py, kStencil, y + kStencil * count);
+            std::copy_n(pz, kStencil, z + kStencil * count);
+        }
+        sdf::evaluate(tape, {x, y, z, int(kStencil * count)}, d);
+        for (size_t i = 0; i < count; ++i) {
+            const float *v = d + kStencil * i, *sx = x + kStencil * i, *sy = y + kStencil * i, *sz = z + kStencil * i;
+            const bool empty = !(v[0] < sdf::kEmptyTest);
+            out[first + i] = empty ? sdf::kEmpty : v[0];
+            gradients[first + i] = empty ? vec3{}
+                                         : vec3{(v[1] - v[2]) / (sx[1] - sx[2]), (v[3] - v[4]) / (sy[3] - sy[4]),
+                                                (v[5] - v[6]) / (sz[5] - sz[6])};
+        }
+        first += count;
+    }
+}
+
+// Code that is right in a cube.
+constexpr float kPartMargin = 0.02f;
+class Part final : public SdfField {
+public:
+    Part(std::shared_ptr<const sdf::Program> program, const Box3& bounds)
+        : program_(std::move(program)), bounds_(bounds) {}
+    float distance(vec3 p) const override {
+        if (!near(p)) return float(sdf::evaluate(view(), to_double(p)));
+        float d;
+        sdf::evaluate(view(), {&p.x, &p.y, &p.z, 1}, &d);
+        return d;
+    }
+    float distance(vec3 p, vec3& gradient) const override {
+        float d;
+        ask(view(), std::span(&p, 1), &d, &gradient);
+        return d;
+    }
+    void distances(std::span<const vec3> points, float* out, vec3* gradients) const override {
+        ask(view(), points, out, gradients);
+    }
+    void distances(const sdf::Points& points, float* out) const override { sdf::evaluate(view(), points, out); }
+    Box3 bounds() const override { return bounds_; }
+    size_t cost() const override { return code.size(); }
+
+    std::vector<sdf::Instruction> code;
+
+private:
+    sdf::TapeView view() const { return sdf::view(*program_, code); }
+    std::shared_ptr<const sdf::Program> program_;
+    Box3 bounds_;
+};
+
 // Smooth unions bulge beyond the solids of their operands by at most a quarter of the blend radius.
 Box3 solid_of(const sdf::Program& program) {
     constexpr float kInfinity = std::numeric_limits<float>::infinity();
@@ -73,42 +140,25 @@ float ProgramField::distance(vec3 at, vec3& gradient) const {
 }
 
 void ProgramField::distances(std::span<const vec3> points, float* out, vec3* gradients) const {
-    // The point and its neighbours along the axes, all at once: rounding is below 4e-6 m here, so slopes over 4e-3 m are right to 1e-3.
-    constexpr size_t kStencil = 7, kMost = 9;
-    constexpr float h = kFloatStep;
     sdf::Regions::Cursor cursor = nullptr;
     for (size_t first = 0; first < points.size();) {
-        const vec3 at = points[first];
-        const sdf::TapeView tape = regions_.tape(to_double(at), cursor);  // right a margin around its region
-        if (!near(at)) {
-            out[first] = far_distance(tape, at, gradients[first]);
-            ++first;
-            continue;
-        }
-        float x[kStencil * kMost], y[kStencil * kMost], z[kStencil * kMost], d[kStencil * kMost];
-        size_t count = 0;
-        while (count < kMost && first + count < points.size()) {
-            const vec3 p = points[first + count];
-            if (!near(p) || (count > 0 && !(cursor != nullptr && cursor->contains(to_double(p))))) break;
-            const float px[kStencil] = {p.x, p.x + h, p.x - h, p.x, p.x, p.x, p.x};
-            const float py[kStencil] = {p.y, p.y, p.y, p.y + h, p.y - h, p.y, p.y};
-            const float pz[kStencil] = {p.z, p.z, p.z, p.z, p.z, p.z + h, p.z - h};
-            std::copy_n(px, kStencil, x + kStencil * count);
-            std::copy_n(py, kStencil, y + kStencil * count);
-            std::copy_n(pz, kStencil, z + kStencil * count);
+        const sdf::TapeView tape = regions_.tape(to_double(points[first]), cursor);  // right a margin around its region
+        size_t count = 1;
+        while (count < kStencils && first + count < points.size() && cursor != nullptr &&
+               cursor->contains(to_double(points[first + count])))
             ++count;
-        }
-        sdf::evaluate(tape, {x, y, z, int(kStencil * count)}, d);
-        for (size_t i = 0; i < count; ++i) {
-            const float *v = d + kStencil * i, *sx = x + kStencil * i, *sy = y + kStencil * i, *sz = z + kStencil * i;
-            const bool empty = !(v[0] < sdf::kEmptyTest);
-            out[first + i] = empty ? sdf::kEmpty : v[0];
-            gradients[first + i] = empty ? vec3{}
-                                         : vec3{(v[1] - v[2]) / (sx[1] - sx[2]), (v[3] - v[4]) / (sy[3] - sy[4]),
-                                                (v[5] - v[6]) / (sz[5] - sz[6])};
-        }
+        ask(tape, points.subspan(first, count), out + first, gradients + first);
         first += count;
     }
+}
+
+std::unique_ptr<const SdfField> ProgramField::within(vec3 center, float side) const {
+    thread_local sdf::PruneScratch scratch;
+    auto out = std::make_unique<Part>(program_, bounds_);
+    (void)sdf::prune(regions_.tape_around(to_double(center), 0.5 * double(side) + double(kPartMargin)), center,
+                     kHalfDiagonal * (side + 2 * kPartMargin), out->code, scratch);
+    out->code.shrink_to_fit();
+    return out;
 }
 
 size_t ProgramField::cost() const { return program_->tape().size(); }

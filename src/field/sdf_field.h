@@ -24,6 +24,21 @@ public:
     virtual float distance(vec3 p, vec3& gradient) const = 0;
     /// The same for many points, near each other: out[i], gradients[i].
     virtual void distances(std::span<const vec3> points, float* out, vec3* gradients) const;
+    /// What a question found on its way, handed to the next one near it, of the same field and before the next step: it need not search.
+    struct Trail {
+        uint64_t key = 0;
+        const void* place = nullptr;
+    };
+    virtual float distance(vec3 p, vec3& gradient, Trail&) const { return distance(p, gradient); }
+    virtual void distances(std::span<const vec3> points, float* out, vec3* gradients, Trail&) const {
+        distances(points, out, gradients);
+    }
+    /// As exactly as can be told: what this field interpolates is asked itself.
+    virtual void measure(std::span<const vec3> points, float* out, vec3* gradients, Trail&) const {
+        distances(points, out, gradients);
+    }
+    /// This field within a cube (and 2 cm around it): the same bits there, for less; null: for nothing less. Keeps what it needs.
+    virtual std::unique_ptr<const SdfField> within(vec3, float /*side*/) const { return nullptr; }
     /// out[i] = distance at point i; neighbours of the list should be neighbours in space.
     virtual void distances(const sdf::Points& points, float* out) const = 0;
     /// Values of the 512 texels (x[i], y[j], z[k]), i fastest, of the cube of this side around `center`; false, and nothing written, where
@@ -53,6 +68,7 @@ public:
     void distances(const sdf::Points& points, float* out) const override;
     bool texels(vec3 center, float side, float near, const float* x, const float* y, const float* z,
                 float* out) const override;
+    std::unique_ptr<const SdfField> within(vec3 center, float side) const override;
     uint32_t material(vec3 p) const override;
     Box3 bounds() const override { return bounds_; }
     size_t cost() const override;

@@ -108,6 +108,7 @@ Result<BodyId> World::add(const BodySettings& settings) {
         body.body_from_mass = {body.mass.center, body.mass.axes};
         if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     }
+    body.last = settings.pose * body.body_from_mass;
     body.live = true;
     ++count_;
     create(index, body);
@@ -148,8 +149,10 @@ BodyState World::state(BodyId id) const {
 
 void World::set_pose(BodyId id, const Pose& pose) {
     if (find(id) == nullptr || !finite(pose)) return;
-    bodies_[id.index].settings.pose = pose;
-    put(id.index, pose * bodies_[id.index].body_from_mass);
+    Body& b = bodies_[id.index];
+    b.settings.pose = pose;
+    b.last = pose * b.body_from_mass;
+    put(id.index, b.last);
 }
 
 void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
@@ -182,13 +185,14 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
 
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
-    for (uint32_t i = 0; i < bodies_.size(); ++i)
-        if (bodies_[i].live && bodies_[i].settings.motion == Motion::Dynamic) bodies_[i].last = get(i).pose;
     advance(seconds);
     for (uint32_t i = 0; i < bodies_.size(); ++i) {
         if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;
         const BodyState s = get(i);
-        if (finite(s.pose) && finite(s.linear_velocity) && finite(s.angular_velocity)) continue;
+        if (finite(s.pose) && finite(s.linear_velocity) && finite(s.angular_velocity)) {
+            bodies_[i].last = s.pose;
+            continue;
+        }
         put(i, bodies_[i].last);
         push(i, {}, {});
         ++lost_;

@@ -146,7 +146,7 @@ protected:
         BodySettings settings;
         MassProperties mass;  // zero for what does not move by itself
         Pose body_from_mass;  // centre of mass and principal axes
-        Pose last;            // before the step
+        Pose last;            // where it was last known to be, of its mass
         uint32_t generation = 0;
         bool live = false;
     };

@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kDescentSteps = 12;
 constexpr float kEnough = 2e-4f;  // of the body's radius: a step that gains or loses less ends a descent
+constexpr float kFlat = 2e-6f;    // of the body's radius: a step that promises less is at most 0.1 degrees of a turn
 constexpr float kAlike =
     0.9f;  // cosine: starts that the field faces so like a place already found lead there, after kSure descents
 constexpr size_t kSure = 2;
@@ -21,6 +22,7 @@ constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
 constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
 constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
+constexpr float kSteep = 0.8f;         // gradients above are of one place of the surface
 constexpr float kLeastSlope = 0.25f;   // gradients below are not trusted to tell how far the surface is
 
 struct Probe {
@@ -36,26 +38,37 @@ Probe probe(vec3 p, float d, vec3 g, vec3 otherwise) {
     return {p, -d / std::max(slope, kLeastSlope), g / slope};
 }
 
-Probe probe(const field::SdfField& field, vec3 p, vec3 otherwise) {
-    vec3 g;
-    const float d = field.distance(p, g);
-    return probe(p, d, g, otherwise);
-}
-
 // A body over a field: points in the body's frame, answers in the field's.
 struct Over {
+    Over(const field::SdfField& over, const Convex& of, const Pose& pose)
+        : field(over),
+          body(of),
+          radius(outer_radius(of)),
+          center(pose.position),
+          x(rotate(pose.rotation, {1, 0, 0})),
+          y(rotate(pose.rotation, {0, 1, 0})),
+          z(rotate(pose.rotation, {0, 0, 1})) {}
     const field::SdfField& field;
     const Convex& body;
-    const Pose& pose;
     float radius;
-    Probe at(vec3 local, vec3 otherwise) const { return probe(field, pose * local, otherwise); }
+    vec3 center, x, y, z;  // the body's axes in the field
+    field::SdfField::Trail trail;
+
+    vec3 place(vec3 local) const { return center + x * local.x + y * local.y + z * local.z; }
+    vec3 into(vec3 direction) const { return {dot(x, direction), dot(y, direction), dot(z, direction)}; }
+    Probe at(vec3 local, vec3 otherwise) {
+        vec3 g;
+        const vec3 p = place(local);
+        const float d = field.distance(p, g, trail);
+        return probe(p, d, g, otherwise);
+    }
     // Many at once.
     template <size_t N>
-    void at(const std::array<vec3, N>& local, size_t count, vec3 otherwise, std::array<Probe, N>& out) const {
+    void at(const std::array<vec3, N>& local, size_t count, vec3 otherwise, std::array<Probe, N>& out) {
         std::array<vec3, N> p, g;
         std::array<float, N> d;
-        for (size_t i = 0; i < count; ++i) p[i] = pose * local[i];
-        field.distances(std::span(p.data(), count), d.data(), g.data());
+        for (size_t i = 0; i < count; ++i) p[i] = place(local[i]);
+        field.distances(std::span(p.data(), count), d.data(), g.data(), trail);
         for (size_t i = 0; i < count; ++i) out[i] = probe(p[i], d[i], g[i], otherwise);
     }
 
@@ -64,12 +77,13 @@ struct Over {
         Probe probe;
     };
     // Projected gradient descent; steps that do not go down are quartered.
-    Lowest descend(vec3 local, Probe now) const {
+    Lowest descend(vec3 local, Probe now) {
         float step = 2 * radius;
         for (int i = 0; i < kDescentSteps; ++i) {
-            const vec3 next = project(body, local - direction_into(pose, now.normal) * step);
-            const vec3 move = next - local;
-            if (dot(move, move) < 1e-8f * radius * radius) break;
+            const vec3 down = into(-now.normal);
+            const vec3 next = project(body, local + down * step);
+            // What it would gain on a flat field.
+            if (!(dot(next - local, down) > kFlat * radius)) break;
             const Probe there = at(next, now.normal);
             const float gain = there.depth - now.depth;
             if (gain > 0) {
@@ -106,11 +120,11 @@ private:
     float margin_, apart2_;
 };
 
-// The corners of the face that looks at the surface, and where its edges leave it.
-int add_face(const Over& over, const Probe& lowest, float margin, Contacts& contacts) {
+// The corners of the face that looks at the surface, and where its edges leave it. Whether it lies on the surface with its whole width.
+bool add_face(Over& over, const Probe& lowest, float margin, Contacts& contacts) {
     std::array<vec3, kMostCorners> corners;
-    const size_t n = size_t(face(over.body, direction_into(over.pose, -lowest.normal), corners));
-    if (n < 2) return 0;
+    const size_t n = size_t(face(over.body, over.into(-lowest.normal), corners));
+    if (n < 2) return false;
     std::array<Probe, kMostCorners> probes;
     over.at(corners, n, lowest.normal, probes);
     std::array<bool, kMostCorners> in{};
@@ -136,7 +150,7 @@ int add_face(const Over& over, const Probe& lowest, float margin, Contacts& cont
         }
         count += contacts.add(edge);
     }
-    return count;
+    return count >= (n == 2 ? 2 : 3);
 }
 
 }  // namespace
@@ -144,18 +158,20 @@ int add_face(const Over& over, const Probe& lowest, float margin, Contacts& cont
 void collide(const field::SdfField& field, const Convex& body, const Pose& field_from_body, float margin,
              std::vector<FieldContact>& out) {
     out.clear();
-    const Over over{field, body, field_from_body, outer_radius(body)};
+    Over over(field, body, field_from_body);
     vec3 gradient;
-    const float center = field.distance(field_from_body.position, gradient);
+    const float center = field.distance(over.center, gradient, over.trail);
     if (center > over.radius + margin) return;  // 1-Lipschitz: nothing within reach
     Contacts contacts(out, margin, kSamePlace * over.radius);
     const vec3 up{0, 1, 0};
     const auto from = starts(body);
-    // A ball's lowest point is as far below its centre's value as its radius, wherever one place of the surface is the nearest.
+    // A ball's lowest point is as far below its centre's value as its radius, wherever one place of the surface is the nearest. (Blends
+    // and interpolation flatten slopes, but where several places are near they vanish.)
     constexpr size_t count = kStarts;
     if (body.kind == Convex::Kind::Sphere) {
-        const Over::Lowest low = over.descend({}, probe(field_from_body.position, center, gradient, up));
-        if (low.probe.depth > over.radius - center - kSamePlace * over.radius) {
+        const Over::Lowest low = over.descend({}, probe(over.center, center, gradient, up));
+        const float slope = length(gradient), deep = slope > kSteep ? -center / slope : -center;
+        if (low.probe.depth > over.radius + deep - kSamePlace * over.radius) {
             contacts.add(low.probe);
             return;
         }
@@ -180,19 +196,20 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
         const Over::Lowest low = over.descend(from[order[i]], start);
         seen[descents++] = low.probe.normal;
         if (!contacts.add(low.probe)) continue;
-        if (add_face(over, low.probe, margin, contacts) >= 3) flat[flats++] = low.probe.normal;
+        if (add_face(over, low.probe, margin, contacts)) flat[flats++] = low.probe.normal;
     }
 }
 
 namespace {
 
 // Contacts that were found on interpolated values, as the exact field has them. Those farther apart than the margin go.
-void measure(const field::SdfField& exact, float margin, std::vector<FieldContact>& contacts) {
+void measure(const SdfShape& shape, float margin, std::vector<FieldContact>& contacts) {
     std::array<vec3, kMostContacts> p, g;
     std::array<float, kMostContacts> d;
+    field::SdfField::Trail trail;
     const size_t count = contacts.size();
     for (size_t i = 0; i < count; ++i) p[i] = contacts[i].point;
-    exact.distances(std::span(p.data(), count), d.data(), g.data());
+    shape.bricks().measure(std::span(p.data(), count), d.data(), g.data(), trail);
     for (size_t i = 0; i < count; ++i) {
         const Probe at = probe(p[i], d[i], g[i], contacts[i].normal);
         contacts[i] = {at.p, at.normal, std::min(at.depth, kMostDepth)};
@@ -205,7 +222,19 @@ void measure(const field::SdfField& exact, float margin, std::vector<FieldContac
 void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_body, float margin,
              std::vector<FieldContact>& out) {
     collide(shape.bricks(), body, shape_from_body, margin + shape.bricks().error(), out);
-    if (&shape.bricks() != &shape.field() && !out.empty()) measure(shape.field(), margin, out);
+    if (&shape.bricks() == &shape.field() || out.empty()) return;
+    measure(shape, margin, out);
+    if (body.kind != Convex::Kind::Sphere || out.size() != 1) return;
+    // A ball's lowest point lies where the exact normal says: the facets of voxels would have it roll by steps, and sink into hollows
+    // that are hardly larger than it.
+    for (int i = 0; i < kDescentSteps; ++i) {
+        const FieldContact before = out.front();
+        out.front().point = shape_from_body.position - before.normal * body.size.x;
+        measure(shape, margin, out);
+        const float gain = out.empty() ? -1 : out.front().depth - before.depth;
+        if (!(gain > 0)) out.assign(1, before);
+        if (!(gain > kEnough * body.size.x)) break;
+    }
 }
 
 namespace {
@@ -322,7 +351,7 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
         }
         for (size_t i = 0; i < count; ++i)
             if (now[i].depth > -reach) met.push_back({now[i].p, now[i].normal, std::min(now[i].depth, kMostDepth)});
-        if (!exact && !met.empty()) measure(other.field(), margin, met);
+        if (!exact && !met.empty()) measure(other, margin, met);
         for (FieldContact c : met) {
             if (!of_a) {
                 // From a's frame to b's. The point was on b; what is asked for is the point of a opposite to it.
@@ -369,33 +398,31 @@ std::optional<FieldHit> sweep(const field::SdfField& field, const Convex& body, 
                               float most) {
     const float size = length(way);
     if (!(size > 0)) return std::nullopt;
-    Over over{field, body, field_from_body, outer_radius(body)};
-    Pose pose = field_from_body;
+    Over here(field, body, field_from_body);
     const auto from = starts(body);
     const bool ball = body.kind == Convex::Kind::Sphere;
-    const float near = 1e-4f * over.radius + 1e-5f;
+    const float near = 1e-4f * here.radius + 1e-5f;
     float f = 0;
     for (int i = 0; i < 256 && f <= most; ++i) {
-        pose.position = field_from_body.position + way * f;
+        here.center = field_from_body.position + way * f;
         // Far off one question is enough.
-        const float center = field.distance(pose.position) - over.radius;
-        if (center > over.radius) {
+        const float center = field.distance(here.center) - here.radius;
+        if (center > here.radius) {
             f += center / size;
             continue;
         }
-        const Over here{field, body, pose, over.radius};
         Over::Lowest low{};
         float lowest = std::numeric_limits<float>::infinity();
         for (size_t s = 0; s < kStarts; ++s) {
             const Over::Lowest found = here.descend(from[s], here.at(from[s], {0, 1, 0}));
             const float d = field.distance(found.probe.p);
             if (d < lowest) lowest = d, low = found;
-            if (ball && lowest < center + kSamePlace * over.radius) break;
+            if (ball && lowest < center + kSamePlace * here.radius) break;
         }
         if (lowest <= near) {
             if (dot(low.probe.normal, way) < 0) return FieldHit{f, low.probe.p, low.probe.normal};
             // In touch but leaving: go on until it is clear.
-            f += std::max(near, 0.05f * over.radius) / size;
+            f += std::max(near, 0.05f * here.radius) / size;
             continue;
         }
         f += lowest / size;

@@ -33,6 +33,9 @@ using namespace JPH;
 
 constexpr uint kMostBodies = World::kMostBodies, kMostPairs = 1 << 16, kMostManifolds = 1 << 16;
 constexpr uint kScratchBytes = 16 << 20;
+// Iterations over the velocities of bodies that touch, as many for all that hang together. With 10, a stack of ten boxes sways more and
+// more: they are for bodies that do not touch two others that move.
+constexpr uint kVelocitySteps = 20, kAloneSteps = 10;
 
 // Jolt's registries are of the process: made once, never taken down.
 void set_up() {
@@ -116,7 +119,7 @@ public:
         PhysicsSettings physics;
         physics.mPenetrationSlop = 0.005f;
         physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
-        physics.mNumVelocitySteps = 20;             // with 10, a stack of ten boxes sways more and more
+        physics.mNumVelocitySteps = kVelocitySteps;
         // What has kept its place, within 3 cm for 1.5 s, sleeps: a swaying stack does, a box that starts down a slope does not.
         physics.mTimeBeforeSleep = 1.5f;
         physics.mPointVelocitySleepThreshold = 0.02f;
@@ -260,6 +263,7 @@ protected:
             const std::lock_guard lock(mutex_);
             before.swap(touching_);
         }
+        find_the_alone(before);
         step_begins();
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
         step_ended();
@@ -288,7 +292,7 @@ private:
         std::shared_ptr<const Triangles> triangles;
         Ref<JPH::Shape> shape;
         BodyID id;
-        bool damped = false;
+        bool damped = false, stepped = false, alone = false;
     };
 
     // Between steps nobody else has the bodies.
@@ -299,6 +303,27 @@ private:
         objects_[index].reset();
         const std::lock_guard lock(mutex_);
         std::erase_if(touching_, [&](const Pair& p) { return p.a == index || p.b == index; });
+    }
+
+    // By whom each touched in the last step.
+    void find_the_alone(const std::vector<Pair>& touching) {
+        moving_neighbours_.assign(objects_.size(), 0);
+        const auto moves = [&](uint32_t i) { return bodies()[i].settings.motion == Motion::Dynamic; };
+        for (const Pair& p : touching) {
+            if (!moves(p.a) || !moves(p.b)) continue;
+            ++moving_neighbours_[p.a];
+            ++moving_neighbours_[p.b];
+        }
+        for (uint32_t i = 0; i < objects_.size(); ++i) {
+            if (!objects_[i] || !moves(i)) continue;
+            // Not in its first step: then nobody knows yet.
+            const bool alone = moving_neighbours_[i] < 2 && objects_[i]->stepped;
+            objects_[i]->stepped = true;
+            if (objects_[i]->alone == alone) continue;
+            objects_[i]->alone = alone;
+            const BodyLockWrite lock(system_.GetBodyLockInterfaceNoLock(), objects_[i]->id);
+            lock.GetBody().GetMotionProperties()->SetNumVelocityStepsOverride(alone ? kAloneSteps : 0);
+        }
     }
 
     // Called from Jolt's threads while it steps; what they say is sorted by World::step.
@@ -336,7 +361,8 @@ private:
     std::vector<std::unique_ptr<Object>> objects_;
     mutable std::mutex mutex_;  // of touching_
     std::vector<Pair> touching_;
-    float damped_for_ = 0;  // the step that dampings are set for
+    std::vector<int> moving_neighbours_;  // by index; a pair that touches at several places counts as often
+    float damped_for_ = 0;                // the step that dampings are set for
 };
 
 }  // namespace
