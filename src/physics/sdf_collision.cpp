@@ -20,6 +20,7 @@ constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
 constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
+constexpr size_t kAlong = 4;           // points looked at on a line along a face
 constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
 constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
 constexpr float kSteep = 0.8f;         // gradients above are of one place of the surface
@@ -82,16 +83,18 @@ struct Over {
         for (int i = 0; i < kDescentSteps; ++i) {
             const vec3 down = into(-now.normal);
             const vec3 next = project(body, local + down * step);
-            // What it would gain on a flat field.
-            if (!(dot(next - local, down) > kFlat * radius)) break;
+            const float promise = dot(next - local, down);  // what it gains if the field is flat
+            if (!(promise > kFlat * radius)) break;
             const Probe there = at(next, now.normal);
             const float gain = there.depth - now.depth;
             if (gain > 0) {
                 local = next, now = there;
+                if (gain < kEnough * radius) break;
+            } else if (promise < kEnough * radius) {
+                break;
             } else {
-                step *= 0.25f;
+                step *= 0.25f;  // too far: over a ridge, or to the other side of a gap
             }
-            if (std::abs(gain) < kEnough * radius) break;
         }
         return {local, now};
     }
@@ -120,37 +123,80 @@ private:
     float margin_, apart2_;
 };
 
-// The corners of the face that looks at the surface, and where its edges leave it. Whether it lies on the surface with its whole width.
-bool add_face(Over& over, const Probe& lowest, float margin, Contacts& contacts) {
+// Ends of the two lines through a point of a face that are parallel to its sides (of a round one: across each other); of an edge: its ends.
+size_t across(const std::array<vec3, kMostCorners>& corners, size_t n, vec3 q, std::array<vec3, 4>& ends) {
+    if (n == 2) {
+        ends[0] = corners[0], ends[1] = corners[1];
+        return 2;
+    }
+    const vec3 middle = n == 4 ? (corners[0] + corners[2]) * 0.5f : (corners[0] + corners[4]) * 0.5f;
+    const vec3 u = n == 4 ? (corners[1] - corners[0]) * 0.5f : corners[0] - middle,
+               v = n == 4 ? (corners[3] - corners[0]) * 0.5f : corners[2] - middle;
+    const float a = std::clamp(dot(q - middle, u) / dot(u, u), -1.0f, 1.0f),
+                b = std::clamp(dot(q - middle, v) / dot(v, v), -1.0f, 1.0f);
+    const float wide = n == 4 ? 1 : std::sqrt(1 - b * b), high = n == 4 ? 1 : std::sqrt(1 - a * a);
+    ends = {middle + v * b + u * wide, middle + v * b - u * wide, middle + u * a + v * high, middle + u * a - v * high};
+    return 4;
+}
+
+// The corners of the face that looks at the surface, and where its edges leave it; where it does not lie on it with all corners, also how
+// far the surface goes along it from the lowest point: a plank lies on a beam with a line. Whether all corners touch.
+bool add_face(Over& over, const Over::Lowest& low, float margin, Contacts& contacts) {
     std::array<vec3, kMostCorners> corners;
-    const size_t n = size_t(face(over.body, over.into(-lowest.normal), corners));
+    const size_t n = size_t(face(over.body, over.into(-low.probe.normal), corners));
     if (n < 2) return false;
     std::array<Probe, kMostCorners> probes;
-    over.at(corners, n, lowest.normal, probes);
-    std::array<bool, kMostCorners> in{};
-    int count = 0;
-    for (size_t i = 0; i < n; ++i) {
-        in[i] = contacts.add(probes[i]);
-        count += in[i];
-    }
-    const size_t edges = n == 2 ? 1 : n;
-    for (size_t i = 0; i < edges && n <= 4; ++i) {
-        const size_t j = (i + 1) % n;
-        if (in[i] == in[j]) continue;
-        float inside = in[i] ? 0.0f : 1.0f, outside = 1 - inside;
-        Probe edge = probes[in[i] ? i : j];
+    over.at(corners, n, low.probe.normal, probes);
+    // The last point within the margin on the way from one that is to one that is not.
+    const auto last = [&](vec3 in, vec3 out, Probe at_in) {
+        float inside = 0, outside = 1;
         for (int step = 0; step < kBisections; ++step) {
             const float t = 0.5f * (inside + outside);
-            const Probe middle = over.at(corners[i] + (corners[j] - corners[i]) * t, lowest.normal);
+            const Probe middle = over.at(in + (out - in) * t, low.probe.normal);
             if (middle.depth > -margin) {
-                inside = t, edge = middle;
+                inside = t, at_in = middle;
             } else {
                 outside = t;
             }
         }
-        count += contacts.add(edge);
+        return at_in;
+    };
+    std::array<bool, kMostCorners> in{};
+    size_t count = 0;
+    bool at_corner = false;
+    for (size_t i = 0; i < n; ++i) {
+        in[i] = contacts.add(probes[i]);
+        count += in[i];
+        at_corner = at_corner || length(corners[i] - low.local) < 2 * kSamePlace * over.radius;
     }
-    return count >= (n == 2 ? 2 : 3);
+    if (count == n) return true;
+    const size_t edges = n == 2 ? 1 : n;
+    for (size_t i = 0; i < edges && n <= 4; ++i) {
+        const size_t j = (i + 1) % n;
+        if (in[i] == in[j]) continue;
+        contacts.add(in[i] ? last(corners[i], corners[j], probes[i]) : last(corners[j], corners[i], probes[j]));
+    }
+    if (at_corner || (n == 2 && count > 0)) return false;
+    // Along these lines other places may touch as well: the second beam under a plank.
+    std::array<vec3, 4> ends;
+    const size_t end_count = across(corners, n, low.local, ends);
+    for (size_t e = 0; e < end_count; ++e) {
+        const vec3 way = ends[e] - low.local;
+        if (length(way) < 2 * kSamePlace * over.radius) continue;
+        std::array<vec3, kAlong> points;
+        std::array<Probe, kAlong> found;
+        for (size_t i = 0; i < kAlong; ++i) points[i] = low.local + way * (float(i + 1) / float(kAlong));
+        over.at(points, kAlong, low.probe.normal, found);
+        bool inside = true;
+        for (size_t i = 0; i < kAlong; ++i) {
+            const bool touches = found[i].depth > -margin;
+            if (inside && !touches)
+                contacts.add(last(i == 0 ? low.local : points[i - 1], points[i], i == 0 ? low.probe : found[i - 1]));
+            if (touches && (!inside || i + 1 == kAlong)) contacts.add(found[i]);
+            inside = touches;
+        }
+    }
+    return false;
 }
 
 }  // namespace
@@ -196,7 +242,7 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
         const Over::Lowest low = over.descend(from[order[i]], start);
         seen[descents++] = low.probe.normal;
         if (!contacts.add(low.probe)) continue;
-        if (add_face(over, low.probe, margin, contacts)) flat[flats++] = low.probe.normal;
+        if (add_face(over, low, margin, contacts)) flat[flats++] = low.probe.normal;
     }
 }
 
