@@ -20,7 +20,8 @@ constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
 constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
-constexpr size_t kAlong = 4;           // points looked at on a line along a face
+constexpr float kTouch = 0.25f;        // of the margin: apart by no more counts as lying on it
+constexpr size_t kAlong = 7;           // points looked at on an edge whose ends do not touch
 constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
 constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
 constexpr float kSteep = 0.8f;         // gradients above are of one place of the surface
@@ -123,43 +124,25 @@ private:
     float margin_, apart2_;
 };
 
-// Ends of the two lines through a point of a face that are parallel to its sides (of a round one: across each other); of an edge: its ends.
-size_t across(const std::array<vec3, kMostCorners>& corners, size_t n, vec3 q, std::array<vec3, 4>& ends) {
-    if (n == 2) {
-        ends[0] = corners[0], ends[1] = corners[1];
-        return 2;
-    }
-    const vec3 middle = n == 4 ? (corners[0] + corners[2]) * 0.5f : (corners[0] + corners[4]) * 0.5f;
-    const vec3 u = n == 4 ? (corners[1] - corners[0]) * 0.5f : corners[0] - middle,
-               v = n == 4 ? (corners[3] - corners[0]) * 0.5f : corners[2] - middle;
-    const float a = std::clamp(dot(q - middle, u) / dot(u, u), -1.0f, 1.0f),
-                b = std::clamp(dot(q - middle, v) / dot(v, v), -1.0f, 1.0f);
-    const float wide = n == 4 ? 1 : std::sqrt(1 - b * b), high = n == 4 ? 1 : std::sqrt(1 - a * a);
-    ends = {middle + v * b + u * wide, middle + v * b - u * wide, middle + u * a + v * high, middle + u * a - v * high};
-    return 4;
-}
-
-// The corners of the face that looks at the surface, and where its edges leave it; where it does not lie on it with all corners, also how
-// far the surface goes along it from the lowest point: a plank lies on a beam with a line. Whether all corners touch.
+// The corners of the face that looks at the surface, and where its edges leave it. Where its lowest point is none of the corners, also the
+// stretches of edges that touch between ends that do not: a plank lies on two beams with lines. Whether all corners touch.
 bool add_face(Over& over, const Over::Lowest& low, float margin, Contacts& contacts) {
     std::array<vec3, kMostCorners> corners;
     const size_t n = size_t(face(over.body, over.into(-low.probe.normal), corners));
     if (n < 2) return false;
     std::array<Probe, kMostCorners> probes;
     over.at(corners, n, low.probe.normal, probes);
-    // The last point within the margin on the way from one that is to one that is not.
-    const auto last = [&](vec3 in, vec3 out, Probe at_in) {
+    // The last point that touches on the way from one that does to one that does not; where values are interpolated, a little before it,
+    // so that the exact field finds it touching too.
+    const float error = over.field.error(), touch = kTouch * (margin - error);
+    const auto last = [&](vec3 in, vec3 out) {
         float inside = 0, outside = 1;
         for (int step = 0; step < kBisections; ++step) {
             const float t = 0.5f * (inside + outside);
-            const Probe middle = over.at(in + (out - in) * t, low.probe.normal);
-            if (middle.depth > -margin) {
-                inside = t, at_in = middle;
-            } else {
-                outside = t;
-            }
+            (over.at(in + (out - in) * t, low.probe.normal).depth > -touch ? inside : outside) = t;
         }
-        return at_in;
+        const float back = error / std::max(length(out - in), 1e-6f);
+        return over.at(in + (out - in) * std::max(inside - back, 0.0f), low.probe.normal);
     };
     std::array<bool, kMostCorners> in{};
     size_t count = 0;
@@ -170,31 +153,24 @@ bool add_face(Over& over, const Over::Lowest& low, float margin, Contacts& conta
         at_corner = at_corner || length(corners[i] - low.local) < 2 * kSamePlace * over.radius;
     }
     if (count == n) return true;
-    const size_t edges = n == 2 ? 1 : n;
-    for (size_t i = 0; i < edges && n <= 4; ++i) {
-        const size_t j = (i + 1) % n;
-        if (in[i] == in[j]) continue;
-        contacts.add(in[i] ? last(corners[i], corners[j], probes[i]) : last(corners[j], corners[i], probes[j]));
-    }
-    if (at_corner || (n == 2 && count > 0)) return false;
-    // Along these lines other places may touch as well: the second beam under a plank.
-    std::array<vec3, 4> ends;
-    const size_t end_count = across(corners, n, low.local, ends);
-    for (size_t e = 0; e < end_count; ++e) {
-        const vec3 way = ends[e] - low.local;
-        if (length(way) < 2 * kSamePlace * over.radius) continue;
+    // Of a round face two lines across stand for its edges. They are the body's own, so what rests has the same points every step.
+    const size_t lines = n == 2 ? 1 : n == 4 ? 4 : 2;
+    for (size_t k = 0; k < lines; ++k) {
+        const size_t i = n == 8 ? 2 * k : k, j = n == 8 ? i + 4 : (k + 1) % n;
+        if (in[i] && in[j]) continue;
+        if (in[i] || in[j]) {
+            if (n <= 4) contacts.add(in[i] ? last(corners[i], corners[j]) : last(corners[j], corners[i]));
+            continue;
+        }
+        if (at_corner) continue;
         std::array<vec3, kAlong> points;
         std::array<Probe, kAlong> found;
-        for (size_t i = 0; i < kAlong; ++i) points[i] = low.local + way * (float(i + 1) / float(kAlong));
+        for (size_t p = 0; p < kAlong; ++p)
+            points[p] = corners[i] + (corners[j] - corners[i]) * (float(p + 1) / float(kAlong + 1));
         over.at(points, kAlong, low.probe.normal, found);
-        bool inside = true;
-        for (size_t i = 0; i < kAlong; ++i) {
-            const bool touches = found[i].depth > -margin;
-            if (inside && !touches)
-                contacts.add(last(i == 0 ? low.local : points[i - 1], points[i], i == 0 ? low.probe : found[i - 1]));
-            if (touches && (!inside || i + 1 == kAlong)) contacts.add(found[i]);
-            inside = touches;
-        }
+        const auto touches = [&](size_t p) { return p < kAlong && found[p].depth > -touch; };
+        for (size_t p = 0; p < kAlong; ++p)
+            if (touches(p) && !(touches(p - 1) && touches(p + 1))) contacts.add(found[p]);  // ends of a stretch
     }
     return false;
 }

@@ -28,6 +28,12 @@ std::string shortest(float value) {
     return out;
 }
 
+std::string shortest(double value) {
+    std::string out;
+    append_number(out, value);
+    return out;
+}
+
 std::string json_quoted(std::string_view text) {
     std::string out = "\"";
     for (const char c : text) {

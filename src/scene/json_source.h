@@ -115,5 +115,6 @@ bool is_utf8(std::string_view text);
 std::string json_quoted(std::string_view text);
 /// Shortest digits that read back as the same float, also where JSON has no word for the value ("nan", "inf").
 std::string shortest(float value);
+std::string shortest(double value);
 
 }  // namespace kiln::scene

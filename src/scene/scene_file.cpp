@@ -252,6 +252,10 @@ private:
                     if (!in_.choice(*m, kMotionNames, &motion)) return false;
                     body.motion = SceneBody::Motion(motion);
                 }
+                if (mesh) body.mesh = doc_.text(*mesh);
+                if (const auto v = doc_.find(c, "collision");
+                    v && mesh && doc_.text(*v) == "triangles" && body.motion != SceneBody::Motion::Static)
+                    return in_.fail(*v, "\"triangles\" stand still; make the motion \"static\", or say \"convex\"");
                 if (const auto v = doc_.find(c, "continuous")) body.continuous = doc_.is(*v, JsonType::True);
                 if (edits && doc_.first(*edits) == doc_.next(*edits))
                     return in_.fail(*edits, "no edits; name at least one");

@@ -40,6 +40,7 @@ struct SceneBody {
     enum class Motion : uint8_t { Static, Kinematic, Dynamic };
     std::string id;
     std::vector<std::string> edits;  ///< names; empty for the body of a mesh
+    std::string mesh;                ///< the id of one of `meshes`; empty for the body of edits
     Motion motion = Motion::Dynamic;
     bool continuous = false;
     Numbers numbers;

@@ -22,6 +22,8 @@ public:
     }
     Text& number(float v) { return raw(scene::shortest(v)); }
     Text& number(double v) { return number(float(v)); }
+    /// To the microsecond: 0.016667, not what a float makes of a sixtieth.
+    Text& time(double seconds) { return raw(scene::shortest(std::round(seconds * 1e6) / 1e6)); }
     Text& quoted(std::string_view s) { return raw(scene::json_quoted(s)); }
     Text& key(std::string_view k) { return raw("\"").raw(k).raw("\": "); }
     Text& vector(vec3 v) { return raw("[").number(v.x).raw(", ").number(v.y).raw(", ").number(v.z).raw("]"); }
@@ -60,10 +62,10 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
 
     Text frames, events;
     const auto frame = [&] {
-        frames.next().raw("\n  {").key("time").number(simulation.time()).raw(", ").key("bodies").raw("[");
+        frames.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("bodies").raw("[");
         const char* between = "";
         for (const scene::Simulation::Member& m : simulation.members()) {
-            const physics::BodyState state = world.state(m.body);
+            const physics::BodyState state = simulation.state(m);
             frames.raw(between).raw("\n    {").key("id").quoted(m.id).raw(", ");
             frames.key("position").vector(state.pose.position).raw(", ");
             frames.key("rotation").rotation(state.pose.rotation).raw(", ");
@@ -81,7 +83,7 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     for (int64_t i = 1; i <= last; ++i) {
         if (auto done = simulation.step(); !done) return done.error();
         for (const scene::Simulation::Event& e : simulation.events()) {
-            events.next().raw("\n  {").key("time").number(simulation.time()).raw(", ").key("type").quoted(e.type);
+            events.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("type").quoted(e.type);
             events.raw(", ").key("a").quoted(e.a).raw(", ").key("b").quoted(e.b).raw("}");
         }
         const bool due = settings.every <= step || i >= int64_t(std::llround(double(shown) * settings.every / step));
@@ -91,8 +93,8 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     }
     Text bodies;
     for (const scene::Simulation::Member& m : simulation.members()) {
-        bodies.next().raw("\n  {").key("id").quoted(m.id).raw(", ").key("mass").number(world.mass(m.body)).raw(", ");
-        bodies.key("center_of_mass").vector(world.center_of_mass(m.body)).raw("}");
+        bodies.next().raw("\n  {").key("id").quoted(m.id).raw(", ").key("mass").number(m.mass.mass).raw(", ");
+        bodies.key("center_of_mass").vector(m.mass.center).raw("}");
     }
     Text text;
     text.raw("{").key("backend").quoted(world.backend()).raw(",\n").key("bodies").raw("[").raw(bodies.out);

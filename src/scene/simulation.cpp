@@ -6,6 +6,8 @@
 
 #include "base/format.h"
 
+#include <kiln/shapes.h>
+
 #include <algorithm>
 #include <cmath>
 #include <thread>
@@ -16,6 +18,8 @@ namespace {
 
 constexpr const char* kWorldName = "world";
 constexpr float kPartDensity = 1000;  // kg/m³, a body's default
+constexpr float kSettleSeconds = 2;   // a part asleep for so long is ground again
+constexpr int kMeshResolution = 64;   // cells along the longest side of a body's mesh
 
 // The scene's own where no material says.
 std::vector<physics::Surface> surfaces_of(const SceneData& data) {
@@ -60,15 +64,18 @@ Error Simulation::fault(JsonIndex place, const std::string& id, const std::strin
 }
 
 std::string Simulation::name_of(physics::BodyId id) const {
-    return id.index < names_.size() ? names_[id.index] : std::string();
+    const auto found = names_.find(id);
+    return found != names_.end() ? found->second : std::string();
 }
 
 Result<void> Simulation::add(const physics::BodySettings& body, std::string_view name) {
     auto id = world_->add(body);
     if (!id) return id.error();
-    members_.push_back({std::string(name), *id});
-    if (id->index >= names_.size()) names_.resize(size_t(id->index) + 1);
-    names_[id->index] = name;
+    physics::MassProperties mass;
+    mass.mass = world_->mass(*id);
+    mass.center = world_->center_of_mass(*id);
+    members_.push_back({std::string(name), *id, mass});
+    names_.emplace(*id, name);
     return {};
 }
 
@@ -80,8 +87,9 @@ std::shared_ptr<const physics::SdfShape> Simulation::ground_shape(const Box3& ch
 }
 
 Result<void> Simulation::set_ground(std::shared_ptr<const field::ProgramField> list, const Box3& changed) {
-    ground_ = cuts_.empty() ? std::shared_ptr<const field::SdfField>(std::move(list))
-                            : std::make_shared<const field::LayeredField>(std::move(list), cuts_);
+    list_ = std::move(list);
+    ground_ = cuts_.empty() ? std::shared_ptr<const field::SdfField>(list_)
+                            : std::make_shared<const field::LayeredField>(list_, cuts_);
     if (ground_body_) {
         world_->set_field(*ground_body_, ground_shape(changed), changed);
         return {};
@@ -104,9 +112,12 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
     World::Impl& impl = *start_.impl_;
     for (const SceneBody& body : impl.data.bodies) {
         const auto wrong = [&](const std::string& message) { return fault(body.place, body.id, message); };
-        if (body.edits.empty())
-            return wrong("bodies of meshes are not simulated yet; give it edits, such as one of the shape \"mesh\"");
         std::vector<Edit> edits;
+        if (!body.mesh.empty()) {
+            auto edit = edit_of_mesh(body);
+            if (!edit) return wrong(edit.error().message);
+            edits.push_back(std::move(*edit));
+        }
         for (const std::string& name : body.edits) {
             const uint32_t slot = impl.edits.find(name);
             if (slot == EditList::kNone)
@@ -129,7 +140,9 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
             s.shape = *convex;
         } else {
             auto field = field_of(impl, edits);
-            if (!field) return field.error();
+            if (!field) return wrong(field.error().message);
+            if (!body.mesh.empty())
+                if (auto closed = check_closed(body, edits.front()); !closed) return wrong(closed.error().message);
             const Box3 box = (*field)->bounds();
             if (body.motion == SceneBody::Motion::Static) {
                 s.shape = physics::SdfShape::fixed(*field);
@@ -143,6 +156,32 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
         if (auto added = add(s, body.id); !added) return wrong(added.error().message);
     }
     return {};
+}
+
+// A mesh collides as the solid that it bounds: an edit of its file, where the mesh is.
+Result<Edit> Simulation::edit_of_mesh(const SceneBody& body) const {
+    const SceneData& data = start_.impl_->data;
+    const auto mesh =
+        std::find_if(data.meshes.begin(), data.meshes.end(), [&](const SceneMesh& m) { return m.id == body.mesh; });
+    if (mesh == data.meshes.end()) return Error{formatted("there is no mesh \"{}\"", body.mesh), ErrorKind::Input};
+    Edit out;
+    out.name = body.mesh;
+    out.node.shape = SampledMesh{.resolution = float(kMeshResolution)};
+    out.node.shape.data = mesh->file;
+    out.node.transform = mesh->transform;
+    return out;
+}
+
+// What moves has a mass, which an open mesh does not say.
+Result<void> Simulation::check_closed(const SceneBody& body, const Edit& edit) const {
+    const Grids& grids = start_.impl_->grids;
+    const auto grid = grids.by_mesh.find({edit.node.shape.data, kMeshResolution});
+    if (body.motion == SceneBody::Motion::Static || grid == grids.by_mesh.end()) return {};
+    const model::BakeReport& report = grids.mesh_notes[grid->second].report;
+    if (report.topology.closed_manifold()) return {};
+    return Error{formatted("its mesh \"{}\" is not closed ({}); close it, or make the motion \"static\"",
+                           edit.node.shape.data, report.sentence()),
+                 ErrorKind::Input};
 }
 
 Result<void> Simulation::add_triggers() {
@@ -193,6 +232,7 @@ Result<void> Simulation::apply_commands() {
     const auto box = changed_box(*edited_->impl_, edits_, there);
     if (!box) return box.error();
     edits_ = std::move(there);
+    if (auto done = cut_settled(); !done) return done;
     auto list = field_of(*edited_->impl_, edits_);
     if (!list) return list.error();
     const std::shared_ptr<const field::SdfField> before = ground_;
@@ -214,14 +254,71 @@ Result<void> Simulation::apply_commands() {
                                 .surfaces = surfaces_of(data)},
                                formatted("part{}", ++parts_));
         if (!added) return added;
+        loose_.push_back({members_.size() - 1, frozen});
         cuts_.push_back({part.region, false, {}, {}, part.region->bounds()});
         if (auto done = set_ground(*list, part.region->bounds()); !done) return done;
     }
     return {};
 }
 
+// Parts that have slept long enough are ground again, where they lie.
+Result<void> Simulation::settle_parts() {
+    const int enough = std::max(1, int(std::lround(kSettleSeconds / seconds_)));
+    Box3 changed;
+    for (Part& part : loose_) {
+        Member& m = members_[part.member];
+        const physics::BodyState state = world_->state(m.body);
+        part.asleep = state.asleep ? part.asleep + 1 : 0;
+        if (part.asleep < enough) continue;
+        m.rest = state;
+        const Box3 own = part.field->bounds();
+        Box3 box;
+        for (int corner = 0; corner < 8; ++corner) {
+            const vec3 p =
+                state.pose * vec3{(corner & 1) != 0 ? own.max.x : own.min.x, (corner & 2) != 0 ? own.max.y : own.min.y,
+                                  (corner & 4) != 0 ? own.max.z : own.min.z};
+            box = box_union(box, {p, p});
+        }
+        settled_.push_back({cuts_.size(), part.field, state.pose, edits_});
+        cuts_.push_back({part.field, true, state.pose.position, state.pose.rotation, box});
+        changed = box_union(changed, box);
+        world_->remove(m.body);
+    }
+    if (changed.empty()) return {};
+    std::erase_if(loose_, [&](const Part& part) { return members_[part.member].rest.has_value(); });
+    return set_ground(list_, changed);
+}
+
+// What is dug after a part has settled is dug out of the part too: in its own frame.
+Result<void> Simulation::cut_settled() {
+    for (const Settled& part : settled_) {
+        const physics::Pose local = inverse(part.pose);
+        std::vector<Edit> digs;
+        for (const Edit& e : edits_) {
+            if (e.op != Op::Subtract || std::find(part.before.begin(), part.before.end(), e) != part.before.end())
+                continue;
+            digs.push_back(e);
+            const physics::Pose frame = local * frame_of(e);
+            digs.back().node.transform.position = frame.position;
+            digs.back().node.transform.rotation = frame.rotation;
+            digs.back().op = Op::Union;
+        }
+        std::shared_ptr<const field::SdfField> left = part.field;
+        if (!digs.empty()) {
+            auto dug = field_of(*edited_->impl_, digs);
+            if (!dug) return dug.error();
+            const Box3 box = (*dug)->bounds();
+            left = std::make_shared<const field::LayeredField>(
+                part.field, std::vector<field::LayeredField::Layer>{{std::move(*dug), false, {}, {}, box}});
+        }
+        cuts_[part.layer].field = std::move(left);
+    }
+    return {};
+}
+
 Result<void> Simulation::step() {
     if (auto done = apply_commands(); !done) return done;
+    if (auto done = settle_parts(); !done) return done;
     world_->step(seconds_);
     ++steps_;
     triggers_.update(*world_);

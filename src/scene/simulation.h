@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Simulation: a scene's bodies, run from their start. The ground is the world's list without the edits of bodies, read from host bricks
-// near what moves; commands with times change a copy of the world on the way, and what they cut loose becomes a body. The order of a
-// step: commands, ground and loose parts, physics, triggers.
+// near what moves; commands with times change a copy of the world on the way, and what they cut loose becomes a body, which settles back
+// into the ground where it has slept for a while. The order of a step: commands, ground and loose parts, physics, triggers.
 #pragma once
 
 #include "field/brick_field.h"
@@ -12,6 +12,7 @@
 
 #include <kiln/world.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -36,8 +37,12 @@ public:
     struct Member {
         std::string id;
         physics::BodyId body;
+        physics::MassProperties mass{};
+        std::optional<physics::BodyState>
+            rest{};  ///< of a part that has settled back into the world: it is no body any more
     };
     const std::vector<Member>& members() const { return members_; }
+    physics::BodyState state(const Member& m) const { return m.rest ? *m.rest : world_->state(m.body); }
 
     /// Of the last step: contacts that began or ended, then who entered or left triggers.
     struct Event {
@@ -49,8 +54,12 @@ public:
 private:
     explicit Simulation(const World& start) : start_(start) {}
     Result<void> add_bodies(const SimulateSettings& settings);
+    Result<Edit> edit_of_mesh(const SceneBody& body) const;
+    Result<void> check_closed(const SceneBody& body, const Edit& edit) const;
     Result<void> add_triggers();
     Result<void> apply_commands();
+    Result<void> settle_parts();
+    Result<void> cut_settled();
     /// The world's list is this now, but for what came loose; it differs from what was there in `changed`.
     Result<void> set_ground(std::shared_ptr<const field::ProgramField> list, const Box3& changed);
     std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
@@ -64,18 +73,32 @@ private:
     std::vector<std::string> trigger_names_;  // by index
     std::unordered_set<std::string> owned_;   // edits of bodies
     std::vector<Member> members_;
-    std::vector<std::string> names_;  // by index of the body
+    std::map<physics::BodyId, std::string> names_;  // also of those that are no more
     std::vector<Event> events_;
     float seconds_ = 0;
     int64_t steps_ = 0;
 
     // The ground.
     std::vector<Edit> edits_;
-    std::shared_ptr<const field::SdfField> ground_;  // the list, with the parts that came loose cut out
+    std::shared_ptr<const field::ProgramField> list_;
+    std::shared_ptr<const field::SdfField> ground_;  // the list, with the parts that came loose cut out and put to it
     std::shared_ptr<const field::BrickField> bricks_;
     std::vector<field::LayeredField::Layer> cuts_;
     std::optional<physics::BodyId> ground_body_;
     float voxel_size_ = 0, near_ = 0;  // metres
+    struct Part {
+        size_t member;
+        std::shared_ptr<const field::PartField> field;
+        int asleep = 0;  // steps
+    };
+    std::vector<Part> loose_;  // those that have not settled
+    struct Settled {
+        size_t layer;  // of cuts_
+        std::shared_ptr<const field::PartField> field;
+        physics::Pose pose;
+        std::vector<Edit> before;  // the list when it settled
+    };
+    std::vector<Settled> settled_;
     int parts_ = 0;
 
     // Commands.

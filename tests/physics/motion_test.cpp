@@ -65,9 +65,10 @@ TEST_P(InMotion, ABridgeOfTenPlanksCarriesABallAcross) {
               edit(kiln::Box{.half_extents = {6, 0.5f, 0.2f}}, {4.5f, -0.6f, -0.8f})});
     std::vector<BodyId> planks;
     for (int i = 0; i < 10; ++i)
-        planks.push_back(s.add({.shape = i % 2 == 0 ? BodyShape(Convex::box({0.498f, 0.05f, 1.2f}))
-                                                    : BodyShape(moving({edit(kiln::Box{.half_extents = {0.498f, 0.05f, 1.2f}})})),
-                                .pose = {{float(i), -0.05f, 0}, {}}}));
+        planks.push_back(
+            s.add({.shape = i % 2 == 0 ? BodyShape(Convex::box({0.498f, 0.05f, 1.2f}))
+                                       : BodyShape(moving({edit(kiln::Box{.half_extents = {0.498f, 0.05f, 1.2f}})})),
+                   .pose = {{float(i), -0.05f, 0}, {}}}));
     s.run(1);
     const BodyId ball = s.add({.shape = Convex::sphere(0.4f),
                                .pose = {{0, 0.4f, 0}, {}},
@@ -108,44 +109,46 @@ TEST_P(InMotion, ASlideOverAHillAcrossBricksKeepsItsEnergyAndNeverKicks) {
         EXPECT_EQ(kicks, 0) << solid.name;
         const BodyState state = s.world->state(id);
         EXPECT_GT(state.pose.position.x, 12) << solid.name;
-        const float energy = dot(state.linear_velocity, state.linear_velocity) / 2 +
-                             kGravity * (state.pose.position.y - height);
+        const float energy =
+            dot(state.linear_velocity, state.linear_velocity) / 2 + kGravity * (state.pose.position.y - height);
         EXPECT_NEAR(energy / 18, 1, 0.01f) << solid.name;
     }
 }
 
-TEST(SlowPhysics, EnginesAgreeOnAPile) {
-    // A walled pit, so that nobody rolls away.
-    std::vector<float> means;
+TEST(SlowPhysics, EnginesAgreeOnHowHighPilesAre) {
+    // Walled pits, so that nobody rolls away. Where each body comes to lie is chance: a mean of 180 bodies has a spread of two or three
+    // hundredths.
+    std::vector<double> means;
     for (const std::string& engine : engines()) {
-        Scene s(engine);
-        s.ground({edit(kiln::Box{.half_extents = {4, 8, 4}}),
-                  edit(kiln::Box{.half_extents = {0.8f, 8, 0.8f}}, {0, 4, 0}, Op::Subtract)});
-        std::mt19937 rng(17);
-        const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
-        std::vector<BodyId> ids;
-        for (int i = 0; i < 80; ++i) {
-            const Convex convex = i % 3 == 0   ? Convex::sphere(0.25f)
-                                  : i % 3 == 1 ? Convex::box({0.25f, 0.2f, 0.2f})
-                                               : Convex::cylinder(0.2f, 0.22f);
-            ids.push_back(s.add({.shape = convex,
-                                 .pose = {{(i & 1 ? 0.38f : -0.38f) + uniform(-0.05f, 0.05f), -3.5f + 0.62f * float(i / 4),
-                           (i & 2 ? 0.38f : -0.38f) + uniform(-0.05f, 0.05f)},
-                                          axis_angle({0, 0, 1}, uniform(0, 3))},
-                                 .angular_damping = 0.5f}));
-        }
-        s.run(12);
         double sum = 0;
-        for (const BodyId id : ids) {
-            const vec3 p = s.world->state(id).pose.position;
-            EXPECT_GT(p.y, -4) << engine;
-            EXPECT_LT(std::max(std::abs(p.x), std::abs(p.z)), 0.8f) << engine;
-            sum += double(p.y) + 4;
+        for (const unsigned seed : {17u, 18u, 19u}) {
+            Scene s(engine);
+            s.ground({edit(kiln::Box{.half_extents = {4, 8, 4}}),
+                      edit(kiln::Box{.half_extents = {0.8f, 8, 0.8f}}, {0, 4, 0}, Op::Subtract)});
+            std::mt19937 rng(seed);
+            const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
+            std::vector<BodyId> ids;
+            for (int i = 0; i < 60; ++i) {
+                const Convex convex = i % 3 == 0   ? Convex::sphere(0.25f)
+                                      : i % 3 == 1 ? Convex::box({0.25f, 0.2f, 0.2f})
+                                                   : Convex::cylinder(0.2f, 0.22f);
+                const vec3 at{((i & 1) != 0 ? 0.38f : -0.38f) + uniform(-0.05f, 0.05f), -3.5f + 0.62f * float(i / 4),
+                              ((i & 2) != 0 ? 0.38f : -0.38f) + uniform(-0.05f, 0.05f)};
+                ids.push_back(s.add(
+                    {.shape = convex, .pose = {at, axis_angle({0, 0, 1}, uniform(0, 3))}, .angular_damping = 0.5f}));
+            }
+            s.run(6);
+            for (const BodyId id : ids) {
+                const vec3 p = s.world->state(id).pose.position;
+                EXPECT_GT(p.y, -4) << engine;
+                EXPECT_LT(std::max(std::abs(p.x), std::abs(p.z)), 0.8f) << engine;
+                sum += double(p.y) + 4;
+            }
+            EXPECT_EQ(s.world->lost(), 0) << engine;
         }
-        EXPECT_EQ(s.world->lost(), 0) << engine;
-        means.push_back(float(sum / 80));
+        means.push_back(sum / 180);
     }
-    for (const float mean : means) EXPECT_NEAR(mean / means[0], 1, 0.02f);
+    for (const double mean : means) EXPECT_NEAR(mean / means[0], 1, 0.05);
 }
 
 }  // namespace

@@ -6,7 +6,10 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "temp_folder.h"
+
 #include <cmath>
+#include <fstream>
 #include <string>
 
 using namespace kiln;
@@ -233,7 +236,10 @@ TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
                 testing::AllOf(HasSubstr("bodies[1].edits[0]"), HasSubstr("body \"x\" already")));
     EXPECT_THAT(
         message(R"({"format": 1, "meshes": [{"id": "m", "file": "m.glb"}], "bodies": [{"id": "x", "mesh": "m"}]})"),
-        HasSubstr("bodies of meshes"));
+        testing::AllOf(HasSubstr("bodies[0]"), HasSubstr("m.glb")));
+    EXPECT_THAT(message(R"({"format": 1, "meshes": [{"id": "m", "file": "m.glb"}],
+      "bodies": [{"id": "x", "mesh": "m", "collision": "triangles"}]})"),
+                testing::AllOf(HasSubstr("bodies[0].collision"), HasSubstr("static")));
     EXPECT_THAT(message(kTumble, {.backend = "no such"}), testing::AllOf(HasSubstr("no such"), HasSubstr("bullet")));
     EXPECT_THAT(message(kTumble, {.seconds = NAN}), HasSubstr("finite"));
     EXPECT_THAT(message(kTumble, {.seconds = -1}), HasSubstr("0 or more"));
@@ -287,6 +293,111 @@ TEST(Simulate, WhatIsCutAgainIsCutFromWhatWasLeft) {
             << "no second copy of the first part";
         const json& end = out["frames"].back();
         EXPECT_NEAR(body(end, "part2")["position"][1].get<double>(), 0.9, 0.1) << engine;
+    }
+}
+
+TEST(Simulate, APartThatHasComeToRestIsGroundAgainAndCanBeCutAgain) {
+    const World world = parsed(kPillar);
+    std::vector<TimedCommand> later = kCut;
+    // Through the fallen part, which reaches from 1.6 m to 3.1 m now.
+    later.push_back(
+        {6, "cut",
+         R"({"time": 6, "command": {"add": {"id": "slit2", "shape": "box", "half_extents": [1, 0.1, 1], "position": [0, 2.4, 0], "op": "subtract"}}})",
+         2});
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 8, .every = 0.5, .backend = engine, .edits = later});
+        ASSERT_EQ(out["bodies"].size(), 3u) << engine;
+        EXPECT_NEAR(out["bodies"][1]["mass"].get<double>(), 540, 15) << engine;
+        EXPECT_NEAR(out["bodies"][2]["mass"].get<double>(), 0.6 * 0.6 * 0.6 * 1000, 15) << engine;
+        const json &first = body(out["frames"][11], "part1"), &end = body(out["frames"][16], "part1");
+        EXPECT_EQ(first["position"], end["position"]) << engine << ": it stays where it settled";
+        EXPECT_TRUE(end["asleep"].get<bool>());
+        // 2.8 m, and down by the 0.2 m of the slit.
+        EXPECT_NEAR(body(out["frames"][16], "part2")["position"][1].get<double>(), 2.6, 0.04) << engine;
+        EXPECT_EQ(run(world, {.seconds = 8, .every = 0.5, .backend = engine, .threads = 2, .edits = later}), out);
+    }
+}
+
+TEST(Simulate, TimesAreTidy) {
+    const auto text = parsed(kDug).simulate_json({.seconds = 0.05});
+    ASSERT_TRUE(text);
+    EXPECT_THAT(*text, testing::AllOf(HasSubstr(R"("time": 0,)"), HasSubstr(R"("time": 0.016667,)"),
+                                      HasSubstr(R"("time": 0.033333,)"), HasSubstr(R"("time": 0.05,)")));
+}
+
+TEST(Simulate, AMeshIsABodyOfTheSolidThatItBounds) {
+    const TempFolder folder;
+    const auto write = [&](const char* name, int faces) {
+        std::ofstream out(folder / name);
+        for (const char* v : {"0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1"})
+            out << "v " << v << "\n";
+        constexpr const char* kFaces[] = {"4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"};
+        for (int i = 0; i < faces; ++i) out << "f " << kFaces[i] << "\n";
+    };
+    write("cube.obj", 6);
+    write("open.obj", 5);
+    const auto scene = [&](const char* file) {
+        return World::parse(R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}],
+          "meshes": [{"id": "m", "file": ")" +
+                                std::string(file) + R"(", "position": [0, 1, 0], "scale": 0.8}],
+          "bodies": [{"id": "crate", "mesh": "m", "density": 500}]})",
+                            (folder / "s.kiln.json").string());
+    };
+    const auto world = scene("cube.obj");
+    ASSERT_TRUE(world) << world.error().message;
+    for (const std::string& engine : engines()) {
+        const json out = run(*world, {.seconds = 3, .every = 3, .backend = engine});
+        EXPECT_NEAR(out["bodies"][0]["mass"].get<double>(), 500 * 0.512, 5) << engine;
+        EXPECT_NEAR(out["bodies"][0]["center_of_mass"][0].get<double>(), 0.4, 0.005) << engine;
+        EXPECT_NEAR(body(out["frames"][1], "crate")["position"][1].get<double>(), 0, 0.01) << engine;
+    }
+    const auto open = scene("open.obj");
+    ASSERT_TRUE(open) << open.error().message;
+    const auto refused = open->simulate_json({.seconds = 1});
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, testing::AllOf(HasSubstr("bodies[0]"), HasSubstr("open.obj"),
+                                                        HasSubstr("not closed"), HasSubstr("4 open")));
+}
+
+// Boulders thrown onto the benches of the quarry.
+TEST(SlowSimulate, BouldersComeToRestInTheQuarryWithoutFallingThroughOrTrembling) {
+    std::ifstream in(KILN_SOURCE_DIR "/scenes/quarry.kiln.json");
+    json scene = json::parse(in);
+    scene["bodies"] = json::array();
+    constexpr double kAcross[] = {1.0, -2.9, -4.4, 2.0}, kUp[] = {1.5, 4.6, 7.0, 1.2};
+    for (int i = 0; i < 16; ++i) {
+        const std::string id = "boulder-" + std::to_string(i);
+        json edit = {{"id", id},
+                     {"position", {double(i) - 7.5, kUp[i % 4], kAcross[i % 4]}},
+                     {"rotation", {0.258819, 0, 0, 0.9659258}}};
+        if (i % 4 == 0) edit.update({{"shape", "sphere"}, {"radius", 0.3}});
+        if (i % 4 == 1) edit.update({{"shape", "box"}, {"half_extents", {0.35, 0.25, 0.3}}});
+        if (i % 4 == 2) edit.update({{"shape", "rounded_box"}, {"half_extents", {0.4, 0.25, 0.3}}, {"rounding", 0.1}});
+        if (i % 4 == 3) edit.update({{"shape", "ellipsoid"}, {"radii", {0.35, 0.25, 0.3}}});
+        scene["edits"].push_back(edit);
+        scene["bodies"].push_back({{"id", "b" + std::to_string(i)},
+                                   {"edits", {id}},
+                                   {"density", 2500},
+                                   {"friction", 0.8},
+                                   {"linear_damping", 0.5},
+                                   {"angular_damping", 3}});
+    }
+    const World world = parsed(scene.dump());
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 20, .every = 0.5, .backend = engine});
+        int early = 0;
+        for (size_t i = 0; i < 16; ++i) {
+            const auto at = [&](size_t frame) -> const json& { return out["frames"][frame]["bodies"][i]; };
+            for (size_t frame = 0; frame < out["frames"].size(); ++frame)
+                EXPECT_GT(at(frame)["position"][1].get<double>(), 0.2) << engine << " " << i << " " << frame;
+            early += at(13)["asleep"].get<bool>();
+            EXPECT_TRUE(at(20)["asleep"].get<bool>()) << engine << " " << i;
+            for (int k = 0; k < 3; ++k)
+                EXPECT_NEAR(at(20)["position"][size_t(k)].get<double>(), at(40)["position"][size_t(k)].get<double>(),
+                            1e-3)
+                    << engine << " " << i;
+        }
+        EXPECT_GE(early, 12) << engine << ": most sleep within 6.5 s";
     }
 }
 
