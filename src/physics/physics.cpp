@@ -289,6 +289,35 @@ std::vector<BodyContact> World::contacts(const Convex& shape, const Pose& pose, 
     return out;
 }
 
+std::vector<BodyContact> World::touch_points(const Touch& touch) const {
+    std::vector<BodyContact> out;
+    if (find(touch.a) == nullptr || find(touch.b) == nullptr) return out;
+    // `on` is the convex one, or the one that moves.
+    BodyId on = touch.b, of = touch.a;
+    if (solid_of(*shape(on)) != nullptr && solid_of(*shape(of)) == nullptr) std::swap(on, of);
+    if (solid_of(*shape(on)) != nullptr && !solid_of(*shape(on))->moves()) std::swap(on, of);
+    std::vector<FieldContact> found;
+    ask(of.index, [&](const field::SdfField& field, const Pose& world) {
+        const Pose local = inverse(world) * state(on).pose;
+        constexpr float kMargin = 0.02f;
+        const SdfShape *solid = solid_of(*shape(on)), *other = solid_of(*shape(of));
+        if (const Convex* convex = std::get_if<Convex>(shape(on))) {
+            other != nullptr ? collide(*other, *convex, local, kMargin, found)
+                             : collide(field, *convex, local, kMargin, found);
+        } else if (solid != nullptr && other != nullptr) {
+            collide(*solid, *other, local, kMargin, found);
+        }
+        for (const FieldContact& c : found)
+            out.push_back({of, world * c.point, rotate(world.rotation, c.normal), c.depth});
+    });
+    return out;
+}
+
+const BodyShape* World::shape(BodyId id) const {
+    const Body* b = find(id);
+    return b != nullptr ? &b->settings.shape : nullptr;
+}
+
 std::vector<BodyId> World::overlap(const Convex& shape, const Pose& pose) const {
     std::vector<BodyId> out;
     for (const BodyContact& c : contacts(shape, pose, 0))

@@ -127,6 +127,10 @@ public:
         float depth = 0;
     };
     std::span<const Touch> touches() const { return touches_; }
+    /// Where the two of a pair touch, as contacts are found: on one of them, with normals out of the other (`body`). For pictures.
+    std::vector<BodyContact> touch_points(const Touch& touch) const;
+    /// Null for a body that is no more.
+    const BodyShape* shape(BodyId id) const;
 
     /// First body on the way from `origin` to origin + way.
     std::optional<BodyHit> cast_ray(vec3 origin, vec3 way, BodyId but = {}) const;

@@ -146,4 +146,22 @@ TEST(BrickField, ASmallTableAfterAnEditGrowsBetweenStepsAndSaysTheSame) {
     EXPECT_EQ(static_cast<const BrickField&>(*field).brick_count(), first.brick_count());
 }
 
+TEST(BrickField, MeasuresWithTheBitsOfTheExactFieldEverywhere) {
+    const auto exact = exact_of(hills());
+    const BrickField bricks(exact, {.voxel_size = 0.07f, .near = 0.3f});
+    // Near the surface and far from it, also beyond where stencils are floats.
+    for (const float reach : {6.0f, 60.0f}) {
+        const std::vector<vec3> points = some_points(3000, reach, 4);
+        std::vector<float> d(points.size()), e(points.size());
+        std::vector<vec3> g(points.size()), h(points.size());
+        SdfField::Trail trail;
+        bricks.measure(points, d.data(), g.data(), trail);
+        exact->distances(points, e.data(), h.data());
+        for (size_t i = 0; i < points.size(); ++i) {
+            ASSERT_EQ(d[i], e[i]) << i;
+            ASSERT_EQ(g[i], h[i]) << i;
+        }
+    }
+}
+
 }  // namespace
