@@ -8,15 +8,15 @@
 namespace kiln::field {
 namespace {
 
-constexpr int kSearchLooks = 8;          // along a stretch of a ray
-constexpr int kSearchRounds = 3;         // each on a stretch some 3.5 times shorter
-constexpr float kSearchMore = 0.25f;     // voxels before and behind the voxel that was passed
-constexpr float kSlopeStep = 0.125f;     // voxels between the two looks that a slope is taken from
-constexpr float kNearEnough = 0.02f;     // voxels: one more step from there ends within a tenth of it, slopes being known
+constexpr int kSearchLooks = 8;       // along a stretch of a ray
+constexpr int kSearchRounds = 3;      // each on a stretch some 3.5 times shorter
+constexpr float kSearchMore = 0.25f;  // voxels before and behind the voxel that was passed
+constexpr float kSlopeStep = 0.125f;  // voxels between the two looks that a slope is taken from
+constexpr float kNearEnough = 0.02f;  // voxels: one more step from there ends within a tenth of it, slopes being known
 constexpr float kFlattest = -0.02f;
 constexpr int kPolishRounds = 6;
-constexpr float kFurthest = 1.5f;        // voxels: a surface further away is another one
-constexpr uint32_t kRemembered = 256;    // bricks
+constexpr float kFurthest = 1.5f;      // voxels: a surface further away is another one
+constexpr uint32_t kRemembered = 256;  // bricks
 
 }  // namespace
 
@@ -38,12 +38,15 @@ void RayRefiner::look(size_t to, int ray, float t) {
 
 // All points: those that nobody asks about are of before, and as cheap.
 void RayRefiner::evaluate(uint32_t slot) {
-    sdf::evaluate(sdf::view(field_.program(), field_.code_of(slot)), {looks_.x, looks_.y, looks_.z, kLooks}, looks_.d, isa_);
+    sdf::evaluate(sdf::view(field_.program(), field_.code_of(slot)), {looks_.x, looks_.y, looks_.z, kLooks}, looks_.d,
+                  isa_);
     const float voxels = 1.0f / field_.grid().voxel_size;
     for (float& d : looks_.d) d *= voxels;
 }
 
-void RayRefiner::collect(int ray, uint32_t slot, float from, float to) { targets_.push_back({ray, slot, -1, from, to}); }
+void RayRefiner::collect(int ray, uint32_t slot, float from, float to) {
+    targets_.push_back({ray, slot, -1, from, to});
+}
 
 // fn(slot, targets), at most kMost of one brick at a time.
 template <int kMost, typename Fn>
@@ -79,12 +82,14 @@ void RayRefiner::run(std::span<const NearPass> passes) {
         const NearPass& pass = passes[i];
         if (!(pass.least < kNearPassVoxels) || (hits_[i].state != kMarchMiss && hits_[i].t < pass.to)) continue;
         const uint32_t word = field_.cell_word(pass.cell.x, pass.cell.y, pass.cell.z);
-        collect(int(i), word & kCellSlotMask, std::max(pass.from - kSearchMore, 0.0f), std::min(pass.to + kSearchMore, rays_.t_max[i]));
+        collect(int(i), word & kCellSlotMask, std::max(pass.from - kSearchMore, 0.0f),
+                std::min(pass.to + kSearchMore, rays_.t_max[i]));
     }
     each_brick<kLooks / kSearchLooks>([&](uint32_t slot, std::span<const Target*> some) { search(slot, some); });
     for (size_t i = 0; i < hits_.size(); ++i) {
         // One that starts in solid stays there.
-        if (hits_[i].state == kMarchHit && hits_[i].t > 0) collect(int(i), uint32_t(hits_[i].slot), hits_[i].t, hits_[i].t);
+        if (hits_[i].state == kMarchHit && hits_[i].t > 0)
+            collect(int(i), uint32_t(hits_[i].slot), hits_[i].t, hits_[i].t);
     }
     each_brick<kLooks / 2>([&](uint32_t slot, std::span<const Target*> some) { polish(slot, some); });
 }
@@ -100,7 +105,9 @@ void RayRefiner::search(uint32_t slot, std::span<const Target*> passes) {
     size_t count = 0;
     for (const Target* pass : passes) open[count++] = {pass, pass->from, pass->to};
     for (int round = 0; round < kSearchRounds && count > 0; ++round) {
-        const auto at = [](const Stretch& s, int k) { return s.from + (s.to - s.from) * (float(k) / float(kSearchLooks - 1)); };
+        const auto at = [](const Stretch& s, int k) {
+            return s.from + (s.to - s.from) * (float(k) / float(kSearchLooks - 1));
+        };
         for (size_t i = 0; i < count; ++i) {
             for (int k = 0; k < kSearchLooks; ++k) {
                 look(i * kSearchLooks + size_t(k), open[i].target->ray, at(open[i], k));
@@ -118,12 +125,14 @@ void RayRefiner::search(uint32_t slot, std::span<const Target*> passes) {
             }
             if (solid >= 0) {
                 const float before = at(stretch, std::max(solid - 1, 0)), behind = at(stretch, solid);
-                const float t = solid == 0 ? behind : before + (behind - before) * (d[solid - 1] / (d[solid - 1] - d[solid]));
+                const float t =
+                    solid == 0 ? behind : before + (behind - before) * (d[solid - 1] / (d[solid - 1] - d[solid]));
                 MarchHit& hit = hits_[size_t(stretch.target->ray)];
                 const BrickRecord& record = field_.records()[slot];
                 hit.state = kMarchHit;
                 hit.slot = int(slot);
-                hit.cell = {record.texel_x / kBrickVoxels, record.texel_y / kBrickVoxels, record.texel_z / kBrickVoxels};
+                hit.cell = {record.texel_x / kBrickVoxels, record.texel_y / kBrickVoxels,
+                            record.texel_z / kBrickVoxels};
                 place(stretch.target->ray, t);
                 continue;
             }

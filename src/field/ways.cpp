@@ -66,7 +66,8 @@ void Ways::settle() {
         axis(2, box.min.y, box.max.y, size_.y);
         axis(4, box.min.z, box.max.z, size_.z);
         for (int x = box.min.x; x < box.max.x; x += kWindow)
-            settle_octant(octant, {{x, box.min.y, box.min.z}, {std::min(x + kWindow, box.max.x), box.max.y, box.max.z}});
+            settle_octant(octant,
+                          {{x, box.min.y, box.min.z}, {std::min(x + kWindow, box.max.x), box.max.y, box.max.z}});
     }
     changed_ = {};
 }
@@ -90,7 +91,8 @@ void Ways::settle_octant(int octant, const CellBox& box) {
     std::vector<Reach> reach(size_t(own_rows) * size_t(own_planes));
     const auto each_own = [&](auto&& fn) {
         for (int z = 0; z < own_planes; ++z) {
-            for (int y = 0; y < own_rows; ++y) fn(reach[size_t(z) * size_t(own_rows) + size_t(y)], row(own_y + y, own_z + z));
+            for (int y = 0; y < own_rows; ++y)
+                fn(reach[size_t(z) * size_t(own_rows) + size_t(y)], row(own_y + y, own_z + z));
         }
     };
     each_own([](Reach& r, uint64_t b) { r.blocked = b; });
@@ -124,8 +126,8 @@ void Ways::settle_octant(int octant, const CellBox& box) {
             for (int x = 0; x < count; x += 4) {
                 const auto four = [&](uint64_t word) { return uint32_t(word >> (x + shift)) & 15u; };
                 const Four found = ((all_ones_where(four(r.low)) & 1u) | (all_ones_where(four(r.middle)) & 2u) |
-                                     (all_ones_where(four(r.high)) & 4u))
-                                    << way_shift(octant);
+                                    (all_ones_where(four(r.high)) & 4u))
+                                   << way_shift(octant);
                 const size_t bytes = sizeof(uint32_t) * size_t(std::min(4, count - x));
                 Four had{};
                 std::memcpy(&had, to + x, bytes);

@@ -37,7 +37,9 @@ public:
     const uint32_t* words() const { return words_.data(); }
 
 private:
-    size_t index(ivec3 c) const { return (size_t(c.z) * size_t(size_.y) + size_t(c.y)) * size_t(size_.x) + size_t(c.x); }
+    size_t index(ivec3 c) const {
+        return (size_t(c.z) * size_t(size_.y) + size_t(c.y)) * size_t(size_.x) + size_t(c.x);
+    }
     uint64_t& blocked_word(ivec3 c) {
         return blocked_[(size_t(c.z) * size_t(size_.y) + size_t(c.y)) * row_words_ + size_t(c.x) / 64 + 1];
     }
@@ -46,7 +48,7 @@ private:
     void settle_octant(int octant, const CellBox& box);
 
     ivec3 size_;
-    size_t row_words_ = 0;  // of blocked_; the first and the last two of a row are beyond the grid
+    size_t row_words_ = 0;           // of blocked_; the first and the last two of a row are beyond the grid
     std::vector<uint64_t> blocked_;  // a bit a cell, rows along x
     std::vector<uint32_t> words_;
     CellBox changed_{};

@@ -19,7 +19,9 @@ struct Slow {
     int reach(ivec3 c, int octant) {
         for (int k = 1; k <= kWayReach; ++k) {
             for (int i = 0; i < (k + 1) * (k + 1) * (k + 1); ++i) {
-                const auto axis = [&](int bit, int from, int step) { return (octant & bit) != 0 ? from + step : from - step; };
+                const auto axis = [&](int bit, int from, int step) {
+                    return (octant & bit) != 0 ? from + step : from - step;
+                };
                 const int x = axis(1, c.x, i % (k + 1)), y = axis(2, c.y, i / (k + 1) % (k + 1)),
                           z = axis(4, c.z, i / ((k + 1) * (k + 1)));
                 if (x < 0 || y < 0 || z < 0 || x >= size.x || y >= size.y || z >= size.z) continue;
@@ -42,7 +44,8 @@ void expect_same(const Ways& ways, Slow& slow) {
                         << x << " " << y << " " << z << " octant " << octant;
                 }
                 if (expected != 0) {
-                    ASSERT_EQ(ways.words()[(z * slow.size.y + y) * slow.size.x + x], expected) << x << " " << y << " " << z;
+                    ASSERT_EQ(ways.words()[(z * slow.size.y + y) * slow.size.x + x], expected)
+                        << x << " " << y << " " << z;
                 }
             }
         }
@@ -81,7 +84,8 @@ TEST_P(WaysOfSize, ReachAsFarAsTheCubeIsFreeAfterEveryChange) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sizes, WaysOfSize, testing::Values(ivec3{9, 11, 10}, ivec3{130, 4, 5}, ivec3{64, 3, 3}, ivec3{1, 1, 1}));
+INSTANTIATE_TEST_SUITE_P(Sizes, WaysOfSize,
+                         testing::Values(ivec3{9, 11, 10}, ivec3{130, 4, 5}, ivec3{64, 3, 3}, ivec3{1, 1, 1}));
 
 }  // namespace
 }  // namespace kiln::field
