@@ -29,8 +29,7 @@ uint32_t Reader::reaches(uint32_t a, uint32_t b) {
 uint32_t Reader::choose(uint32_t condition, uint32_t yes, uint32_t other) {
     if (const auto n = known(condition)) return *n != 0 ? yes : other;
     if (yes == other) return yes;
-    return build_.binary(Fn::Add, build_.binary(Fn::Mul, yes, condition),
-                         build_.binary(Fn::Mul, other, no(condition)));
+    return build_.binary(Fn::Add, build_.binary(Fn::Mul, yes, condition), build_.binary(Fn::Mul, other, no(condition)));
 }
 
 Value Reader::choose(uint32_t condition, const Value& yes, const Value& other) {
@@ -80,8 +79,8 @@ bool Reader::ternary(Value& out) {
         if (is_number(yes.type) && is_number(other.type)) {
             yes.type = other.type = Type::Float;
         } else {
-            return fail(place, formatted("one side of ?: is a {}, the other a {}; make them the same",
-                                         named(yes.type), named(other.type)));
+            return fail(place, formatted("one side of ?: is a {}, the other a {}; make them the same", named(yes.type),
+                                         named(other.type)));
         }
     }
     out = choose(out.at[0], yes, other);
@@ -170,8 +169,7 @@ bool Reader::arithmetic(char symbol, Value& a, Value b, size_t place) {
         a.at[i] = build_.binary(fn, a.at[i], b.at[i]);
         if (!whole || fn != Fn::Div) continue;
         const auto quotient = known(a.at[i]);
-        if (!quotient)
-            return fail(place, "whole numbers that depend on the point cannot be divided; make them floats");
+        if (!quotient) return fail(place, "whole numbers that depend on the point cannot be divided; make them floats");
         a.at[i] = k(std::trunc(*quotient));
     }
     return fits(place);
@@ -211,10 +209,8 @@ bool Reader::unary(Value& out) {
         out.at[0] = no(out.at[0]);
         return true;
     }
-    if (out.type == Type::Bool || out.type == Type::Void)
-        return fail(op.place, "this is no number; take the sign out");
-    for (size_t i = 0; op.text == "-" && i < size_t(out.size()); ++i)
-        out.at[i] = build_.unary(Fn::Negate, out.at[i]);
+    if (out.type == Type::Bool || out.type == Type::Void) return fail(op.place, "this is no number; take the sign out");
+    for (size_t i = 0; op.text == "-" && i < size_t(out.size()); ++i) out.at[i] = build_.unary(Fn::Negate, out.at[i]);
     return true;
 }
 
@@ -240,8 +236,7 @@ bool Reader::picked(Type of, std::array<int, 9>& picks, Type& type) {
         if (!expression(index) || !need("]")) return false;
         const auto n = is_number(index.type) ? known(index.at[0]) : std::nullopt;
         const int count = is_matrix(of) ? facts(of).columns : is_vector(of) ? facts(of).size : 0;
-        if (count == 0)
-            return fail(open.place, formatted("a {} has no components; take the brackets out", named(of)));
+        if (count == 0) return fail(open.place, formatted("a {} has no components; take the brackets out", named(of)));
         if (!n || *n < 0 || *n >= count)
             return fail(place, formatted("a component's number is a constant, 0 to {}", count - 1));
         type = is_matrix(of) ? vector_of(count) : Type::Float;
@@ -304,8 +299,8 @@ bool Reader::called(const Token& what, Value& out) {
         if (now().kind == Token::Kind::Name && tokens_[at_ + 1].text != "(") {
             const Variable* const v = find(now().text);
             Target t;
-            if (v != nullptr && !v->constant && v >= variables_.data() &&
-                v < variables_.data() + variables_.size() && target(t) && (is(",") || is(")")))
+            if (v != nullptr && !v->constant && v >= variables_.data() && v < variables_.data() + variables_.size() &&
+                target(t) && (is(",") || is(")")))
                 to = t;
             error_.clear();
             at_ = from;
@@ -330,8 +325,7 @@ bool Reader::called(const Token& what, Value& out) {
         for (size_t i = 0; i < in.size(); ++i) {
             in[i].type = f.parameters[i].type;
             if (f.parameters[i].out && !targets[i])
-                return fail(what.place,
-                            formatted("{} writes to its operand {}; give it a variable", f.name, i + 1));
+                return fail(what.place, formatted("{} writes to its operand {}; give it a variable", f.name, i + 1));
         }
         std::vector<Value> back;
         const Function copy = f;  // functions_ stays as it is; the call may not move it

@@ -12,15 +12,13 @@ bool Reader::construct(Type type, const std::vector<Value>& in, size_t place, Va
     if (in.empty() || size == 0) return fail(place, formatted("{} of nothing; give it numbers", named(type)));
     if (size == 1) {
         const uint32_t v = in[0].at[0];
-        if (in.size() != 1 || is_matrix(in[0].type))
-            return fail(place, formatted("{} takes one number", named(type)));
+        if (in.size() != 1 || is_matrix(in[0].type)) return fail(place, formatted("{} takes one number", named(type)));
         out.at[0] = v;
         if (type == Type::Int && in[0].type == Type::Float) {
             const uint32_t down = build_.unary(Fn::Floor, build_.unary(Fn::Abs, v));  // towards 0
             out.at[0] = choose(reaches(v, k(0)), down, build_.unary(Fn::Negate, down));
         }
-        if (type == Type::Bool && in[0].type != Type::Bool)
-            out.at[0] = no(both(reaches(v, k(0)), reaches(k(0), v)));
+        if (type == Type::Bool && in[0].type != Type::Bool) out.at[0] = no(both(reaches(v, k(0)), reaches(k(0), v)));
         return true;
     }
     if (in.size() == 1 && in[0].size() == 1) {
@@ -32,8 +30,7 @@ bool Reader::construct(Type type, const std::vector<Value>& in, size_t place, Va
         const int n = facts(type).columns, from = facts(in[0].type).columns;
         for (int c = 0; c < n; ++c)
             for (int r = 0; r < n; ++r)
-                out.at[size_t(c * n + r)] =
-                    c < from && r < from ? in[0].at[size_t(c * from + r)] : k(c == r ? 1 : 0);
+                out.at[size_t(c * n + r)] = c < from && r < from ? in[0].at[size_t(c * from + r)] : k(c == r ? 1 : 0);
         return true;
     }
     size_t filled = 0;

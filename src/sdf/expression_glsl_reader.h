@@ -24,7 +24,7 @@ struct TypeFacts {
     int columns;  // of a matrix
 };
 inline constexpr TypeFacts kTypes[] = {{"void", 0, 0}, {"float", 1, 0}, {"int", 1, 0},  {"bool", 1, 0}, {"vec2", 2, 0},
-                                {"vec3", 3, 0}, {"vec4", 4, 0},  {"mat2", 4, 2}, {"mat3", 9, 3}};
+                                       {"vec3", 3, 0}, {"vec4", 4, 0},  {"mat2", 4, 2}, {"mat3", 9, 3}};
 inline const TypeFacts& facts(Type t) { return kTypes[size_t(t)]; }
 inline bool is_number(Type t) { return t == Type::Float || t == Type::Int; }
 inline bool is_vector(Type t) { return t >= Type::Vec2 && t <= Type::Vec4; }

@@ -80,8 +80,7 @@ bool Tokens::name(std::string_view& out) {
 bool Tokens::skip_brackets() {
     const size_t open = at_;
     for (int depth = 0;; ++at_) {
-        if (now().kind == Token::Kind::End)
-            return fail(tokens_[open].place, "this bracket is not closed; close it");
+        if (now().kind == Token::Kind::End) return fail(tokens_[open].place, "this bracket is not closed; close it");
         if (is("(") || is("{") || is("[")) ++depth;
         if ((is(")") || is("}") || is("]")) && --depth == 0) break;
     }
