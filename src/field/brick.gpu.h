@@ -12,7 +12,8 @@ KILN_FIELD_BEGIN
 KILN_CONST int kBrickTexels = 8;  // texels a side
 KILN_CONST int kBrickVoxels = 7;  // voxels (and texel steps) a side
 KILN_CONST int kBrickTexelCount = 512;
-KILN_CONST float kBandVoxels = 4.0f;  // stored distances are clamped to this many voxels
+KILN_CONST float kCellsPerVoxel = 0.142857149f;  // 1 / 7: every device multiplies alike
+KILN_CONST float kBandVoxels = 4.0f;             // stored distances are clamped to this many voxels
 KILN_CONST float kTrilinearErrorVoxels =
     0.8661f;  // sqrt(3)/2: a trilinear value minus this is a lower bound of the distance
 

@@ -56,9 +56,8 @@ private:
 };
 
 template <typename Code>
-uint32_t find_solid(BrickCodes<Code>& brick) {
-    const SolidVoxels found =
-        solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), int(sizeof(Code))));
+uint32_t keep_solid(BrickCodes<Code>& brick, const std::array<Slice, 8>& texels) {
+    const SolidVoxels found = solid_voxels(texels);
     brick.solid = found.rows;
     return found.box;
 }
@@ -91,13 +90,15 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
     BrickContent out;
     if (format == DistanceFormat::Half) {
         HalfCodes& brick = out.half.renew();
-        sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, brick.codes.data());
-        out.solid_box = find_solid(brick);
+        std::array<Slice, 8> solid;
+        sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, brick.codes.data(),
+                          solid.data());
+        out.solid_box = keep_solid(brick, solid);
     } else {
         ByteCodes& brick = out.bytes.renew();
         for (size_t i = 0; i < brick.codes.size(); ++i)
             brick.codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
-        out.solid_box = find_solid(brick);
+        out.solid_box = keep_solid(brick, solid_texels(std::as_bytes(std::span(brick.codes)).data(), 1));
     }
     if (only) {
         out.material = *only;

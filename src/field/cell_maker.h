@@ -57,8 +57,14 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 ///     bool stop()                           asked before each cell that may own a brick: leave the rest alone
 ///     void air(const CellBox& cells)        these are empty and outside, also those it does not want
 ///     void empty(ivec3 cell, bool inside)
-///     bool keeps(ivec3 cell, bool came, ListCuller::Start)    its brick is as it was; `came`: one of `inserted` is in its code
+///     bool keeps(ivec3 cell, Inserted, ListCuller::Start)    it is as it was
 ///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
+enum class Inserted : uint8_t {
+    Shows,    ///< one of the edits that came is in the code of the cell
+    Hidden,   ///< none is
+    NoEffect  ///< with or without them the same is stored
+};
+
 class CellMaker {
 public:
     CellMaker(const sdf::Program& program, const CellLattice& lattice, std::span<const uint32_t> inserted = {})
@@ -104,7 +110,7 @@ private:
     bool beyond(float value, const sdf::Balls& balls) const;
     bool evaluate(ivec3 cell, int i);
     template <typename Sink>
-    void run_cells(Sink& sink);
+    void run_cells(Sink& sink, bool whole_list);
 
     const sdf::Program* program_;
     sdf::Rebased* rebased_;  // null where points count from the world's origin
@@ -172,7 +178,7 @@ void CellMaker::run_block(ivec3 at, const CellBox& bounds, Sink& sink) {
             place_ball(cells_.balls, c, cell_[c], 1);
             if (contains(bounds, cell_[c]) && sink.wants(cell_[c])) cells_.balls.live |= uint64_t(1) << c;
         }
-        run_cells(sink);
+        run_cells(sink, false);
         culler_.drop(cells_.list);
     }
     culler_.drop(groups_.list);
@@ -187,7 +193,7 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
         if (n == 0) return;
         cells_.balls.live = n == 64 ? ~uint64_t(0) : (uint64_t(1) << n) - 1;
         for (int i = n; i < 64; ++i) place_ball(cells_.balls, i, cell_[n - 1], 1);
-        run_cells(sink);
+        run_cells(sink, true);
         n = 0;
     };
     for (int z = box.min.z; z < box.max.z; ++z) {
@@ -205,9 +211,9 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
     culler_.drop(cells_.list);
 }
 
-// cells_ has its list, its balls' places and which of them to look at.
+// cells_ has its list, its balls' places and which of them to look at. `whole_list`: whatever reaches a cell is in the list.
 template <typename Sink>
-void CellMaker::run_cells(Sink& sink) {
+void CellMaker::run_cells(Sink& sink, bool whole_list) {
     size_balls(cells_.balls, 1);
     culler_.fold(cells_);
     uint64_t open = 0;
@@ -222,9 +228,14 @@ void CellMaker::run_cells(Sink& sink) {
     }
     if (open == 0) return;
     culler_.keep(cells_, open);
-    const uint64_t came = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
+    const uint64_t shown = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
+    const uint64_t no_effect = whole_list ? culler_.balls_unchanged_by(cells_, inserted_) : 0;
     for (int i = 0; i < 64; ++i) {
-        if ((open >> i & 1u) == 0 || sink.keeps(cell_[i], (came >> i & 1u) != 0, culler_.start_of(cells_, i))) continue;
+        if ((open >> i & 1u) == 0) continue;
+        const Inserted inserted = (no_effect >> i & 1u) != 0 ? Inserted::NoEffect
+                                  : (shown >> i & 1u) != 0   ? Inserted::Shows
+                                                             : Inserted::Hidden;
+        if (sink.keeps(cell_[i], inserted, culler_.start_of(cells_, i))) continue;
         if (sink.stop()) return;
         if (evaluate(cell_[i], i)) {
             sink.brick(cell_[i], *this);

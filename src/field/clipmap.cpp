@@ -318,7 +318,7 @@ bool Clipmap::fill(int level, Run& run) {
             ++made.cells;
             made.empties.push_back({c, inside});
         }
-        static bool keeps(ivec3, bool, sdf::ListCuller::Start) { return false; }
+        static bool keeps(ivec3, Inserted, sdf::ListCuller::Start) { return false; }
         void brick(ivec3 c, CellMaker& maker) { add_brick(c, maker); }
     };
 
@@ -389,9 +389,9 @@ bool Clipmap::apply(int level, Run& run) {
             if ((word & kCellOccupied) != 0 || ((word & kCellInside) != 0) != inside)
                 made.empties.push_back({c, inside});
         }
-        bool keeps(ivec3 c, bool came, sdf::ListCuller::Start start) {
+        bool keeps(ivec3 c, Inserted inserted, sdf::ListCuller::Start start) {
             const uint32_t word = level.cells.at(c.x, c.y, c.z);
-            if (came || word == kCellMissing || (word & kCellOccupied) == 0) return false;
+            if (inserted == Inserted::Shows || word == kCellMissing || (word & kCellOccupied) == 0) return false;
             if (!stays(map.code_of(word & kCellSlotMask), *batch.program, batch.removed, start)) return false;
             set_done(c);
             return true;

@@ -119,9 +119,11 @@ private:
             }
         }
         void empty(ivec3 cell, bool inside) { builder.set_empty(cell, inside, task, result); }
-        bool keeps(ivec3 cell, bool came, sdf::ListCuller::Start start) const {
-            const uint32_t word = whole() ? 0u : builder.old_->cells_.at(cell.x, cell.y, cell.z);
-            return (word & kCellOccupied) != 0 && !came &&
+        bool keeps(ivec3 cell, Inserted inserted, sdf::ListCuller::Start start) const {
+            if (whole()) return false;
+            const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
+            if ((word & kCellOccupied) == 0) return inserted == Inserted::NoEffect && !builder.was_reached(cell);
+            return inserted != Inserted::Shows &&
                    stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);
         }
         void brick(ivec3 cell, CellMaker& maker) {
@@ -195,20 +197,25 @@ private:
             const CellBox world = cells_reached(*program_, row, options_.voxel_size);
             const CellBox box = grown({world.min - first_cell(), world.max - first_cell()}, 0, size_);
             if (!box.empty()) dirty_.push_back(box);
+            return box;
         };
         for (const RowChange& change : changes_) {
             if (change.removed != kNoRow) {
-                add(change.removed);
+                was_reached_.push_back(add(change.removed));
                 removed_.push_back(change.removed);
             }
             if (change.inserted != kNoRow) {
-                add(change.inserted);
+                (void)add(change.inserted);
                 inserted_.push_back(change.inserted);
             }
         }
         occupancy_changes_.resize(dirty_.size(), CellBox{});
     }
 
+    // By an edit that is gone.
+    bool was_reached(ivec3 c) const {
+        return std::any_of(was_reached_.begin(), was_reached_.end(), [&](const CellBox& b) { return contains(b, c); });
+    }
     bool is_dirty(ivec3 c) const {
         return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return contains(b, c); });
     }
@@ -384,7 +391,7 @@ private:
     std::span<const RowChange> changes_;
     MadeBricks* made_;
     ivec3 size_;
-    std::vector<CellBox> dirty_, occupancy_changes_;
+    std::vector<CellBox> dirty_, was_reached_, occupancy_changes_;
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;
     std::vector<TaskResult> results_;

@@ -4,6 +4,7 @@
 #include "base/hash.h"
 #include "base/parallel_for.h"
 #include "base/profile.h"
+#include "field/ray_refiner.h"
 #include "sdf/eval.h"
 
 #include <algorithm>
@@ -227,12 +228,19 @@ void HostBricks::distances(const sdf::Points& points, float* out, sdf::Isa isa) 
 
 float HostBricks::distance(vec3 p, sdf::Isa isa) const { return wide_distance(wide_view(), p, isa); }
 
-void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const {
+void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const { march(rays, hits, false, isa); }
+
+void HostBricks::march_refined(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const {
+    march(rays, hits, true, isa);
+}
+
+void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, bool refine, sdf::Isa isa) const {
     constexpr size_t kBlock = 512;
     const WideView& view = wide_view();
     const double h = double(view.grid.voxel_size);
     int32_t whole[3][kBlock];
     float part[3][kBlock], direction[3][kBlock], far[kBlock];
+    NearPass passes[kBlock];
     for (size_t first = 0; first < rays.size(); first += kBlock) {
         const size_t count = std::min(kBlock, rays.size() - first);
         for (size_t i = 0; i < count; ++i) {
@@ -251,17 +259,17 @@ void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) 
             direction[0][i] = ray.direction.x, direction[1][i] = ray.direction.y, direction[2][i] = ray.direction.z;
             far[i] = float(std::min(double(ray.t_max) / h, double(kFarVoxels)));
         }
-        wide_march(view,
-                   {{whole[0], whole[1], whole[2]},
-                    {part[0], part[1], part[2]},
-                    {direction[0], direction[1], direction[2]},
-                    far},
-                   int(count), hits + first, isa);
+        const WideRays wide{{whole[0], whole[1], whole[2]},
+                            {part[0], part[1], part[2]},
+                            {direction[0], direction[1], direction[2]},
+                            far};
+        wide_march(view, wide, int(count), hits + first, refine ? passes : nullptr, isa);
         for (size_t i = 0; i < count; ++i) {
             MarchHit& hit = hits[first + i];
             if (hit.state == kMarchHit)
                 hit.slot = int(field_->cell_word(hit.cell.x, hit.cell.y, hit.cell.z) & kCellSlotMask);
         }
+        if (refine) RayRefiner(*field_, wide, {hits + first, count}, isa).run(std::span(passes).first(count));
     }
 }
 

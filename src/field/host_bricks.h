@@ -75,6 +75,9 @@ public:
     /// March of many rays at once, 16 (8, 4) neighbours of the list in step: give them in an order in which neighbours see the same.
     /// Each hit has the bits of march() from 0 to the ray's t_max, but for the counters, which stay 0.
     void march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
+    /// The same, then each moved to where its brick's own code has the surface, and what a ray only just passed looked at with that code too:
+    /// what the edits themselves would show, but for a grazing ray in a thousand. A ray's answer does not depend on the others.
+    void march_refined(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
     /// Not normalised, per voxel, at p in the brick of a world cell ([0, 7]³).
     vec3 gradient(uint32_t slot, ivec3 cell, vec3 p, NormalKind kind) const;
 
@@ -83,6 +86,7 @@ public:
 
 private:
     void take(MadeBricks& made);
+    void march(std::span<const Ray> rays, MarchHit* hits, bool refine, sdf::Isa isa) const;
     void bake_slots(std::span<const uint32_t> slots, int workers);
     void surface_at(uint32_t slot, ivec3 cell, ivec3 voxel, vec3 p, NormalKind kind, Sample& out) const;
 

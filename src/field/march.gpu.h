@@ -73,7 +73,7 @@ KILN_FN float texel_plane_crossing(int texel, int whole, float part, float inver
 
 // Cell that holds the coordinate at t.
 KILN_FN int cell_at(int whole, float part, float direction, float t) {
-    return int(floor((float(whole) + (part + direction * t)) / float(kBrickVoxels)));
+    return int(floor((float(whole) + (part + direction * t)) * kCellsPerVoxel));
 }
 
 // First hit between t_min >= 0 and t_max (voxels). `accelerate` false visits every cell.

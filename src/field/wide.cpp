@@ -5,8 +5,6 @@
 
 #include "field/wide_isa.h"
 
-#include <algorithm>
-
 namespace kiln::field {
 namespace {
 
@@ -17,21 +15,14 @@ WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast
 
 }  // namespace
 
-WideEntry wide_entry_of_brick(const std::byte* codes, uint32_t box) {
-    const uint32_t kept = box & (kNoSolidBox - 1);
-    return kWideOccupied | WideEntry(kept >> 2) << kWideBoxShift | (kept & 3) | address_of(codes);
-}
-uint8_t wide_way_of(uint32_t word, bool solid) {
-    if ((word & kCellOccupied) != 0) return solid ? kWaySolid : uint8_t(0);
-    return uint8_t(((word & kCellInside) != 0 ? kWayInside : 0) | (std::max(word & 7u, 1u) - 1));
-}
+WideEntry wide_entry_of_brick(const std::byte* codes) { return kWideOccupied | address_of(codes); }
 WideEntry wide_entry_of_empty(uint32_t word) {
     return ((word & kCellInside) != 0 ? kWideInside : 0) | WideEntry(word & 7u) << kWideJumpShift |
            address_of(kNoTexels);
 }
 
 WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y,
-                   const uint8_t* first_way, int bytes)
+                   const uint32_t* first_way, int bytes)
     : grid(g),
       pages(first_page),
       pages_x(along_x),
@@ -63,12 +54,12 @@ void wide_distances(const WideView& view, const sdf::Points& points, float* out,
     run(view, points, out);
 }
 
-void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, sdf::Isa isa) {
+void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes, sdf::Isa isa) {
     const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512_rays::march
                      : isa == sdf::Isa::Avx2 ? &wide_avx2::march
                      : isa == sdf::Isa::Sse4 ? &wide_sse4::march
                                              : &wide_scalar::march;
-    run(view, rays, count, hits);
+    run(view, rays, count, hits, passes);
 }
 
 }  // namespace kiln::field

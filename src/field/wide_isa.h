@@ -4,16 +4,17 @@
 
 #include "field/brick_content.h"
 #include "field/codes.gpu.h"
+#include "field/ways.h"
 #include "field/wide.h"
 
 #include <bit>
 #include <cstring>
 
-#define KILN_DECLARE_WIDE(name)                                                        \
-    namespace kiln::field::name {                                                      \
-    float distance(const WideView& view, vec3 p);                                      \
-    void distances(const WideView& view, const sdf::Points& points, float* out);       \
-    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits); \
+#define KILN_DECLARE_WIDE(name)                                                                          \
+    namespace kiln::field::name {                                                                        \
+    float distance(const WideView& view, vec3 p);                                                        \
+    void distances(const WideView& view, const sdf::Points& points, float* out);                         \
+    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes); \
     }
 KILN_DECLARE_WIDE(wide_scalar)
 KILN_DECLARE_WIDE(wide_sse4)

@@ -114,31 +114,42 @@ static inline bool answer_by_slices(const WideView& view, const Located& p, F& o
     const I index = p.cell.page * int32_t(std::tuple_size_v<WidePage>) + p.cell.word;
     const M first = eq(index, splat(index[0])), others = without(all(), first);
     if (any(without(all(), p.inside)) || any(without(others, eq(index, splat(index[kLanes - 1]))))) return false;
-    int32_t slices[kLanes];
     const I slice = to_int(p.z.voxel);
-    std::memcpy(slices, &slice, sizeof slices);
     const Words texel = pair_of(p.row());
     Words v00{}, v10{}, v01{}, v11{};
     I flags = splat(0);
-    const auto look = [&](M lanes, int one) {
+    const auto codes_of = [&](int one) {
         const WideEntry entry = (*view.pages[p.cell.page[one]])[size_t(p.cell.word[one])];
-        flags = select(lanes, splat(int32_t(entry >> 32)), flags);
-        if ((entry & kWideOccupied) == 0) return;
-        const std::byte* const brick = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-        do {
-            const int z = slices[__builtin_ctz(bits(lanes))];
-            const M here = both(lanes, eq(slice, splat(z)));
-            const std::byte* const codes = brick + z * (Half ? 128 : 64);
-            const SliceTable near = slice_table<Half>(codes), far = slice_table<Half>(codes + (Half ? 128 : 64));
-            v00 = looked_up(near, texel, 0, here, v00);
-            v10 = looked_up(near, texel, 8, here, v10);
-            v01 = looked_up(far, texel, 0, here, v01);
-            v11 = looked_up(far, texel, 8, here, v11);
-            lanes = without(lanes, here);
-        } while (any(lanes));
+        flags = select(one == 0 ? all() : others, splat(int32_t(entry >> 32)), flags);
+        return reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
     };
-    look(first, 0);
-    if (any(others)) look(others, kLanes - 1);
+    constexpr int kSlice = Half ? 128 : 64;  // bytes
+    const auto look = [&](const std::byte* codes, M lanes) {
+        const SliceTable near = slice_table<Half>(codes), far = slice_table<Half>(codes + kSlice);
+        v00 = looked_up(near, texel, 0, lanes, v00);
+        v10 = looked_up(near, texel, 8, lanes, v10);
+        v01 = looked_up(far, texel, 0, lanes, v01);
+        v11 = looked_up(far, texel, 8, lanes, v11);
+    };
+    // Mostly all lie in the slices of the first and the last point, be they one or two: both are read, and no branch is to be foreseen.
+    const int first_z = slice[0], last_z = slice[kLanes - 1];
+    const std::byte* const near_codes = codes_of(0);
+    const std::byte* const far_codes = codes_of(kLanes - 1);
+    const M in_last = both(eq(index, splat(index[kLanes - 1])), eq(slice, splat(last_z)));
+    look(near_codes + first_z * kSlice, all());
+    look(far_codes + last_z * kSlice, in_last);
+    M left = without(without(all(), both(first, eq(slice, splat(first_z)))), in_last);
+    if (any(left)) {
+        int32_t slices[kLanes];
+        std::memcpy(slices, &slice, sizeof slices);
+        do {
+            const int one = __builtin_ctz(bits(left));
+            const M cell = (bits(first) >> one & 1u) != 0 ? first : others;
+            const M here = both(cell, eq(slice, splat(slices[one])));
+            look(((bits(first) >> one & 1u) != 0 ? near_codes : far_codes) + slices[one] * kSlice, here);
+            left = without(left, here);
+        } while (any(left));
+    }
     WideCorners corners;
     values_of<Half>(v00, corners.v00.a, corners.v00.b);
     values_of<Half>(v10, corners.v10.a, corners.v10.b);

@@ -99,6 +99,7 @@ struct Packet {
     F3 part, direction, inverse;
     M up_x, up_y, up_z;
     M flat_x, flat_y, flat_z;  // parallel to the planes of an axis
+    I octant;                  // where its octant's bits are in the word of a free cell (ways.h)
 };
 static inline M select_lanes(M m, M a, M b) { return either(both(m, a), without(b, m)); }
 static inline Packet select(M m, const Packet& a, const Packet& b) {
@@ -106,7 +107,8 @@ static inline Packet select(M m, const Packet& a, const Packet& b) {
             select(m, a.direction, b.direction), select(m, a.inverse, b.inverse),
             select_lanes(m, a.up_x, b.up_x),     select_lanes(m, a.up_y, b.up_y),
             select_lanes(m, a.up_z, b.up_z),     select_lanes(m, a.flat_x, b.flat_x),
-            select_lanes(m, a.flat_y, b.flat_y), select_lanes(m, a.flat_z, b.flat_z)};
+            select_lanes(m, a.flat_y, b.flat_y), select_lanes(m, a.flat_z, b.flat_z),
+            select(m, a.octant, b.octant)};
 }
 
 // The plane through which a ray leaves a voxel, of one axis; the brick's own faces are pushed out by kFaceOverlap.
@@ -163,7 +165,7 @@ static inline F3 point_in_voxel(const WideBrickRay& r, I3 voxel, F s) {
             one(voxel.z, r.high.z, r.low.z, r.lead.z, r.rest.z)};
 }
 static inline I cell_of(I whole, F part, F direction, F t) {
-    return to_int(floor((to_float(whole) + (part + direction * t)) / 7.0f));
+    return to_int(floor((to_float(whole) + (part + direction * t)) * kCellsPerVoxel));
 }
 
 // Rays under way, one a lane. What they have to do next differs: look at the next cell, enter a brick, walk its voxels, solve a voxel's cubic.
@@ -176,6 +178,7 @@ struct Marching {
     const WideRays& list;
     const int total;
     MarchHit* const hits;
+    NearPass* const passes;
     int next = 0;
 
     // By lane:
@@ -183,33 +186,36 @@ struct Marching {
     Packet packet{};
     F t_max{}, t{};  // t: where the ray has come to, by cells
     I3 cell{};
-    I reach{};       // cells around that are empty too
+    I reach{};       // cells further on that are free too
+    I box{};         // of the cell's brick, where one was met
     const std::byte* bricks[kLanes] = {};  // codes
     WideBrickRay ray{};
     F enter{}, leave{};  // from ray.t_base: into the voxel, out of the brick
     F past{};            // there no voxel with a solid corner comes any more
     I3 voxel{};
-    M looking = none(), entering = none(), walking = none(), solving = none();
+    M looking = none(), testing = none(), entering = none(), walking = none(), solving = none();
     M stepping = none();  // of those looking: not at the cell where they are, but at the next
 
     void run() {
         while (turn()) continue;
     }
-    // Does what most lanes wait for, looking at cells, which is cheapest, before entering a brick; false when there is nothing left to do.
-    // The weights were found by trying.
+    // Does what most lanes wait for, what is cheap before what is not; false when there is nothing left to do. The weights were found by
+    // trying.
     bool turn() {
-        constexpr int kSpare = kLanes / 4;  // lanes that wait for new rays
-        const int look = count(looking), in = count(entering), walk = count(walking), solve = count(solving);
-        const int busy = look + in + walk + solve;
+        constexpr int kSpare = 3 * kLanes / 8;  // lanes that wait for new rays
+        const int look = count(looking), test = count(testing), in = count(entering), walk = count(walking), solve = count(solving);
+        const int busy = look + test + in + walk + solve;
         if (next < total && kLanes - busy >= kSpare) {
             take();
         } else if (busy == 0) {
             return false;
-        } else if (2 * solve >= max_of(2 * look, 2 * in, 3 * walk)) {
+        } else if (2 * solve >= max_of(max_of(2 * look, 2 * in), max_of(3 * walk, 2 * test))) {
             solve_voxels();
-        } else if (2 * in >= 3 * std::max(look, walk)) {
+        } else if (2 * in >= 3 * max_of(max_of(look, walk), test)) {
             enter_bricks();
-        } else if (walk >= look) {
+        } else if (test >= max_of(look, walk)) {
+            test_boxes();
+        } else if (2 * walk >= look) {
             walk_voxels();
         } else {
             do {
@@ -218,11 +224,12 @@ struct Marching {
         }
         return true;
     }
-    static int max_of(int a, int b, int c) { return std::max(std::max(a, b), c); }
+
+    static int max_of(int a, int b) { return a < b ? b : a; }
 
     // Gives the next rays to free lanes.
     void take() {
-        const M free = without(all(), either(either(looking, entering), either(walking, solving)));
+        const M free = without(all(), either(either(either(looking, testing), entering), either(walking, solving)));
         int32_t whole[3][kLanes] = {}, order[kLanes] = {}, taken[kLanes] = {};
         float part[3][kLanes] = {}, direction[3][kLanes] = {}, far[kLanes] = {};
         for (uint32_t left = bits(free); left != 0 && next < total; left &= left - 1, ++next) {
@@ -251,6 +258,8 @@ struct Marching {
         p.up_x = lt(number(0), p.inverse.x);
         p.up_y = lt(number(0), p.inverse.y);
         p.up_z = lt(number(0), p.inverse.z);
+        const auto bit = [](M up, int octant) { return select(up, splat(way_shift(octant)), splat(0)); };
+        p.octant = bit(p.up_x, 1) + bit(p.up_y, 2) + bit(p.up_z, 4);
         packet = select(fresh, p, packet);
         number_in_list = select(fresh, load(order), number_in_list);
         t_max = select(fresh, load(far), t_max);
@@ -284,20 +293,21 @@ struct Marching {
     void look_at_cells() {
         looking = without(looking, without(both(looking, stepping), step_cells(both(looking, stepping))));
         const I at = (cell.z * view.grid.size_y + cell.y) * view.grid.size_x + cell.x;
-        const I way = gather_bytes(view.ways, select(looking, at, splat(0)));
-        const M arrived = both(looking, has(way, kWaySolid));
-        entering = either(entering, arrived);
+        const I way = gather_bytes(view.ways, select(looking, at, splat(0)) << 2);
+        const M arrived = both(looking, lt(way, splat(0)));  // kWaySolid
+        testing = either(testing, arrived);
+        box = select(arrived, way, box);
         looking = without(looking, arrived);
         const M inside = both(looking, has(way, kWayInside));
         if (any(inside)) {
             write(inside, kMarchInside, t, {splat(0), splat(0), splat(0)}, {number(0), number(0), number(0)});
             looking = without(looking, inside);
         }
-        reach = way & kWayReach;  // that of lanes elsewhere is set when they come back
+        reach = (way >> packet.octant) & kWayReach;  // that of lanes elsewhere is set when they come back
         stepping = looking;
     }
 
-    // Leaves the cube of empty cells around each lane's; answers the lanes that are in the grid still.
+    // Leaves the cube of free cells that each lane's cell begins; answers the lanes that are in the grid still.
     M step_cells(M m) {
         const auto border = [&](M up, I c) { return select(up, c + reach + 1, c - reach); };
         const I border_x = border(packet.up_x, cell.x), border_y = border(packet.up_y, cell.y),
@@ -310,13 +320,13 @@ struct Marching {
         const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x);
         const M by_z = without(without(all(), by_x), by_y);
         if (any(both(m, lt(splat(0), reach)))) {  // the other axes may have moved within the cube
-            const auto drift = [&](I& c, M by, I whole, F part, F direction) {
-                const M drifts = without(without(m, by), eq(direction, number(0)));
-                c = select(drifts, min(max(cell_of(whole, part, direction, t), c - reach), c + reach), c);
+            const auto drift = [&](I& c, M by, M up, M flat, I whole, F part, F direction) {
+                const I low = select(up, c, c - reach), high = select(up, c + reach, c);
+                c = select(without(without(m, by), flat), min(max(cell_of(whole, part, direction, t), low), high), c);
             };
-            drift(cell.x, by_x, packet.whole.x, packet.part.x, packet.direction.x);
-            drift(cell.y, by_y, packet.whole.y, packet.part.y, packet.direction.y);
-            drift(cell.z, by_z, packet.whole.z, packet.part.z, packet.direction.z);
+            drift(cell.x, by_x, packet.up_x, packet.flat_x, packet.whole.x, packet.part.x, packet.direction.x);
+            drift(cell.y, by_y, packet.up_y, packet.flat_y, packet.whole.y, packet.part.y, packet.direction.y);
+            drift(cell.z, by_z, packet.up_z, packet.flat_z, packet.whole.z, packet.part.z, packet.direction.z);
         }
         const auto leap = [&](I& c, M by, M up, I to) { c = select(both(m, by), select(up, to, to - 1), c); };
         leap(cell.x, by_x, packet.up_x, border_x);
@@ -335,19 +345,40 @@ struct Marching {
         looking = either(looking, m);
     }
 
+    I box_corner(int shift) const { return (box >> shift) & 7; }
+
+    // Rays that pass by the box of all voxels with a solid corner go on, the others enter the brick. Positions are rounded, so boxes are taken
+    // to be larger than they are.
+    void test_boxes() {
+        const M m = testing;
+        testing = none();
+        F in = number(0), out = t_max;
+        const F margin = t * 1e-6f + 0.015625f;
+        const auto clip = [&](M up, M flat, I c, int low, int high, I whole, F part, F inverse) {
+            const I first = c * kBrickVoxels - whole + box_corner(low), last = c * kBrickVoxels - whole + box_corner(high) + 1;
+            const F more = abs(inverse) * margin;
+            in = max(in, select(flat, number(-kFarVoxels), (to_float(select(up, first, last)) - part) * inverse - more));
+            out = min(out, select(flat, number(kFarVoxels), (to_float(select(up, last, first)) - part) * inverse + more));
+        };
+        clip(packet.up_x, packet.flat_x, cell.x, 0, 9, packet.whole.x, packet.part.x, packet.inverse.x);
+        clip(packet.up_y, packet.flat_y, cell.y, 3, 12, packet.whole.y, packet.part.y, packet.inverse.y);
+        clip(packet.up_z, packet.flat_z, cell.z, 6, 15, packet.whole.z, packet.part.z, packet.inverse.z);
+        const M meets = both(m, le(in, out));
+        entering = either(entering, meets);
+        go_on(without(m, meets));
+    }
+
     // Each to its first voxel of the box that holds all voxels with a solid corner, as if it had walked there.
     void enter_bricks() {
         const M m = entering;
         entering = none();
-        Lanes x(cell.x), y(cell.y), z(cell.z), boxes(splat(0));
+        Lanes x(cell.x), y(cell.y), z(cell.z);
         each_lane(m, [&](int i) {
             const int index = cell_word_index(x[i], y[i], z[i], view.pages_x, view.pages_y);
             const WideEntry entry = (*view.pages[index / kPageWords])[size_t(index % kPageWords)];
             bricks[i] = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-            boxes[i] = int32_t(wide_solid_box(entry));
             __builtin_prefetch(bricks[i] - kSolidRowsBeforeCodes);
         });
-        const I box = boxes.all();
         ray = select(m, brick_ray_of(packet, {cell.x * kBrickVoxels, cell.y * kBrickVoxels, cell.z * kBrickVoxels}), ray);
         const F first = number(-kFaceOverlap), last = number(float(kBrickVoxels) + kFaceOverlap);
         F in = 0.0f - ray.t_base, out = t_max - ray.t_base;
@@ -359,8 +390,7 @@ struct Marching {
         clip(packet.up_y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
         clip(packet.up_z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
 
-        const auto corner = [&](int shift) { return (box >> shift) & 7; };
-        const I3 low{corner(0), corner(3), corner(6)}, high{corner(9), corner(12), corner(15)};
+        const I3 low{box_corner(0), box_corner(3), box_corner(6)}, high{box_corner(9), box_corner(12), box_corner(15)};
         const auto to_box = [&](M up, I from, I to, F h, F l, F inverse, M flat) {
             return crossing(entry_plane(up, select(up, from, to)), h, l, inverse, flat, -kFarVoxels);
         };
@@ -485,8 +515,14 @@ struct Marching {
         const F out_any = exits(out_x, out_y, out_z);
         const F exit = max(min(out_any, leave), enter);
         const WideCorners corners = corners_of(m);
-        const F root = first_root(cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit)), m);
+        const WideCubic cubic = cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit));
+        const F root = first_root(cubic, m);
         const M hit = both(m, le(root, number(1)));
+        if (passes != nullptr) {
+            const F least = min(min(cubic.b0, cubic.b1), min(cubic.b2, cubic.b3));
+            const M near = both(without(m, hit), both(lt(least, number(kNearPassVoxels)), le(cubic.b2, cubic.b3)));
+            if (any(near)) note(near, least, ray.t_base + enter, ray.t_base + exit);
+        }
         if (any(hit)) {
             const F s = enter + root * (exit - enter);
             const F3 p = point_in_voxel(ray, voxel, s);
@@ -497,6 +533,26 @@ struct Marching {
         const M still = step_voxels(missed, out_any, out_x, out_y);
         walking = either(walking, still);
         go_on(without(missed, still));
+    }
+
+    void note(M m, F least, F from, F to) const {
+        struct {
+            int32_t number[kLanes], cell[3][kLanes];
+            float least[kLanes], from[kLanes], to[kLanes];
+        } lanes;
+        const auto store = [](auto& there, auto v) { std::memcpy(&there, &v, sizeof v); };
+        store(lanes.number, number_in_list);
+        store(lanes.cell[0], cell.x), store(lanes.cell[1], cell.y), store(lanes.cell[2], cell.z);
+        store(lanes.least, least), store(lanes.from, from), store(lanes.to, to);
+        const GridParams& g = view.grid;
+        each_lane(m, [&](int i) {
+            NearPass& pass = passes[lanes.number[i]];
+            if (!(lanes.least[i] < pass.least)) return;
+            pass = {lanes.least[i],
+                    lanes.from[i],
+                    lanes.to[i],
+                    {lanes.cell[0][i] + g.cell_x, lanes.cell[1][i] + g.cell_y, lanes.cell[2][i] + g.cell_z}};
+        });
     }
 
     void write(M m, int state, F at, I3 in_voxel, F3 p) const {
@@ -524,7 +580,8 @@ struct Marching {
     }
 };
 
-void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits) {
+void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes) {
+    for (int i = 0; passes != nullptr && i < count; ++i) passes[i].least = kNearPassVoxels;
     for (int i = 0; i < count; ++i) {
         MarchHit miss{};
         miss.state = kMarchMiss;
@@ -533,8 +590,8 @@ void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits
         hits[i] = miss;
     }
     if (view.texel_bytes == 2) {
-        Marching<true>{view, rays, count, hits}.run();
+        Marching<true>{view, rays, count, hits, passes}.run();
     } else {
-        Marching<false>{view, rays, count, hits}.run();
+        Marching<false>{view, rays, count, hits, passes}.run();
     }
 }

@@ -53,32 +53,37 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
         const size_t pages = cells_.words().pages();
         pages_.resize_pages(pages);
         top_.assign(pages, &far_page());
-        const ivec3 size = cells_.size();
-        ways_.renew().assign(size_t(size.x) * size_t(size.y) * size_t(size.z) + kWayPadding,
-                             wide_way_of(uint32_t(kMaxJump), false));
+        ways_ = Shared<Ways>::make(cells_.size());
         for (size_t page = 0; page < pages; ++page) {
             if (cells_.words().find(page) != nullptr) make_page(page, contents);
         }
     }
+    ways_.write().settle();
     const ivec3 pages = cells_.pages();
-    view_ = WideView(field.grid(), top_.data(), pages.x, pages.y, ways_->data(),
+    view_ = WideView(field.grid(), top_.data(), pages.x, pages.y, ways_->words(),
                      field.options().format == DistanceFormat::Half ? 2 : 1);
     ready_.store(true, std::memory_order_release);
 }
 
-// Word number `index` of a page, and its cell's byte.
+// Word number `index` of a page, and its cell's way.
 void WideTables::set(size_t page, size_t index, WidePage& to, const BrickContents& contents) {
     const uint32_t word = (*cells_.words().find(page))[index];
     const BrickContent* const brick = (word & kCellOccupied) != 0 ? &contents[word & kCellSlotMask] : nullptr;
-    to[index] = brick != nullptr ? wide_entry_of_brick(brick->codes(), brick->solid_box) : wide_entry_of_empty(word);
+    to[index] = brick != nullptr ? wide_entry_of_brick(brick->codes()) : wide_entry_of_empty(word);
     const ivec3 pages = cells_.pages(), size = cells_.size();
     const auto along = [](size_t at, int place) { return int(at >> (3 * place) & 7); };
     const int p = int(page);
     const ivec3 cell{p % pages.x * kCellPage + along(index, 0), p / pages.x % pages.y * kCellPage + along(index, 1),
                      p / (pages.x * pages.y) * kCellPage + along(index, 2)};
     if (cell.x >= size.x || cell.y >= size.y || cell.z >= size.z) return;
-    ways_.write()[(size_t(cell.z) * size_t(size.y) + size_t(cell.y)) * size_t(size.x) + size_t(cell.x)] =
-        wide_way_of(word, brick != nullptr && brick->solid_box != kNoSolidBox);
+    Ways& ways = ways_.write();
+    if (brick != nullptr && brick->solid_box != kNoSolidBox) {
+        ways.set_solid(cell, brick->solid_box);
+    } else if (brick == nullptr && (word & kCellInside) != 0) {
+        ways.set_inside(cell);
+    } else {
+        ways.set_free(cell);
+    }
 }
 
 void WideTables::make_page(size_t page, const BrickContents& contents) {

@@ -6,6 +6,7 @@
 #include "base/shared.h"
 #include "field/brick_content.h"
 #include "field/field.h"
+#include "field/ways.h"
 #include "field/wide.h"
 
 #include <atomic>
@@ -44,7 +45,7 @@ private:
     CellMap cells_;  // the words that entries were made from
     Pages pages_;
     std::vector<const WidePage*> top_;
-    Shared<std::vector<uint8_t>> ways_;
+    Shared<Ways> ways_;
     WideView view_;
 
     // Until then: tables that are ready, and slots baked since. None: everything is to be made.

@@ -245,6 +245,14 @@ void ListCuller::drop(const List& list) {
     code_.resize(list.code);
 }
 
+uint64_t ListCuller::balls_unchanged_by(const Fold& fold, std::span<const uint32_t> rows) const {
+    uint64_t out = ~uint64_t(0);
+    for (size_t i = 0; i < fold.list.count; ++i) {
+        if (std::find(rows.begin(), rows.end(), entries_[fold.list.first + i].row) != rows.end()) out &= fold.left[i];
+    }
+    return out;
+}
+
 uint64_t ListCuller::balls_with(const Fold& fold, std::span<const uint32_t> rows) const {
     uint64_t out = 0;
     for (size_t i = 0; i < fold.list.count; ++i) {

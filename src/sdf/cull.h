@@ -62,6 +62,8 @@ public:
 
     /// After keep(): the balls in whose code an edit of `rows` is.
     uint64_t balls_with(const Fold& fold, std::span<const uint32_t> rows) const;
+    /// After fold(): the balls throughout which what stands before an edit of `rows` decides, for each of them that is in the list.
+    uint64_t balls_unchanged_by(const Fold& fold, std::span<const uint32_t> rows) const;
 
 private:
     struct Entry {

@@ -130,8 +130,9 @@ float evaluate_brick(const TapeView& tape, const float* x, const float* y, const
                                             memory_of(tape.memory_slots, kChunkBytes));
 }
 
-void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes, Isa isa) {
-    KILN_CHOOSE(isa, store_halves)(values.data(), values.size(), scale, limit, least, codes);
+void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes,
+                  uint64_t* solid, Isa isa) {
+    KILN_CHOOSE(isa, store_halves)(values.data(), values.size(), scale, limit, least, codes, solid);
 }
 
 double zero_bound(const TapeView& tape, dvec3 p_world) {

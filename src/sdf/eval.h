@@ -90,8 +90,8 @@ float evaluate_brick(const TapeView& tape, const float* x, const float* y, const
                      Isa isa = best_isa());
 
 /// Half-float bits of values * scale: clamped to +-limit, which NaN becomes too, and never below `least` unless exactly 0 (which loses its
-/// sign). `count` is a multiple of 16; limit and least are normal halves.
+/// sign). Bit i of `solid`: value i is 0 or less. `count` is a multiple of 64; limit and least are normal halves.
 void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes,
-                  Isa isa = best_isa());
+                  uint64_t* solid, Isa isa = best_isa());
 
 }  // namespace kiln::sdf

@@ -255,7 +255,7 @@ static inline uint32_t all_words(uint32_t w) { return w; }
 #endif
 
 // See store_halves() in sdf/eval.h. Integer arithmetic, to nearest, ties to even.
-void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes) {
+void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes, uint64_t* solid) {
     constexpr size_t kLanes = kChunkPoints / KILN_VECTORS;
     const real zero = real(param(0));
     const auto rounded = [](real size) {
@@ -265,6 +265,8 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
     const auto at_limit = rounded(real(param(limit))), at_least = rounded(real(param(least)));
     for (size_t i = 0; i < count; i += kLanes) {
         const real v = load(values + i) * param(scale);
+        if (i % 64 == 0) solid[i / 64] = 0;
+        solid[i / 64] |= uint64_t(lane_bits(le(v, zero))) << (i % 64);
         const real size = abs(v);
         auto code = choose(lt(size, real(param(limit))), rounded(size), at_limit);  // NaN is not below it
         code = choose(lt(size, real(param(least))), at_least, code);

@@ -49,15 +49,19 @@ TEST(Codes, LanesMakeTheSameHalves) {
     }
     for (uint32_t code = 0x0400; code < 0x4400; ++code)
         values.push_back(0.5f * (half_value(code) + half_value(code + 1)));
-    while (values.size() % 16 != 0) values.push_back(1);
+    while (values.size() % 64 != 0) values.push_back(1);
     std::vector<uint16_t> codes(values.size());
+    std::vector<uint64_t> solid(values.size() / 64);
     const float scale = 3.7f;
     for (const sdf::Isa isa : {sdf::Isa::Scalar, sdf::Isa::Sse4, sdf::Isa::Avx2, sdf::Isa::Avx512}) {
         if (!sdf::has_isa(isa)) continue;
         for (const float by : {1.0f, scale}) {
-            sdf::store_halves(values, by, kBandVoxels, kHalfStepVoxels, codes.data(), isa);
-            for (size_t i = 0; i < values.size(); ++i)
+            sdf::store_halves(values, by, kBandVoxels, kHalfStepVoxels, codes.data(), solid.data(), isa);
+            for (size_t i = 0; i < values.size(); ++i) {
                 ASSERT_EQ(codes[i], half_code(values[i] * by)) << values[i] << " isa " << int(isa);
+                ASSERT_EQ((solid[i / 64] >> (i % 64) & 1u) != 0, half_value(codes[i]) <= 0)
+                    << values[i] << " isa " << int(isa);
+            }
         }
     }
 }

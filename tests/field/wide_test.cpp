@@ -207,6 +207,55 @@ TEST_P(WideInEachFormat, RaysThroughEdgesAndCornersHaveTheBitsOfTheScalarMarch) 
     }
 }
 
+TEST_P(WideInEachFormat, ARefinedRayHasTheSameBitsAloneAndAmongOthersOnEveryInstructionSet) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    std::vector<MarchHit> plain(rays.size()), alone(rays.size()), among(rays.size());
+    bricks.march(rays, plain.data());
+    for (size_t i = 0; i < rays.size(); ++i)
+        bricks.march_refined(std::span(rays).subspan(i, 1), &alone[i], sdf::Isa::Scalar);
+    int moved = 0, found = 0;
+    for (const sdf::Isa isa : isas()) {
+        bricks.march_refined(rays, among.data(), isa);
+        for (size_t i = 0; i < rays.size(); ++i) {
+            ASSERT_EQ(among[i].state, alone[i].state) << "isa " << int(isa) << " ray " << i;
+            ASSERT_EQ(std::bit_cast<uint32_t>(among[i].t), std::bit_cast<uint32_t>(alone[i].t)) << "ray " << i;
+            ASSERT_EQ(among[i].slot, alone[i].slot) << "ray " << i;
+            ASSERT_EQ(among[i].voxel, alone[i].voxel) << "ray " << i;
+            ASSERT_EQ(among[i].p, alone[i].p) << "ray " << i;
+            moved += among[i].t != plain[i].t;
+            found += among[i].state == kMarchHit && plain[i].state == kMarchMiss;
+        }
+    }
+    EXPECT_GT(moved, 1000);
+    EXPECT_GT(found, 0);
+}
+
+// Where a refined ray arrives, the edits have their surface; what was passed for the texels' sake alone is found.
+TEST_P(WideInEachFormat, RefinedRaysEndOnTheEditsSurface) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const std::vector<Ray> rays = all_kinds_of_rays();
+    const float h = bricks.field().grid().voxel_size;
+    std::vector<MarchHit> hits(rays.size());
+    bricks.march_refined(rays, hits.data());
+    int on = 0, off = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        if (hits[i].state != kMarchHit || hits[i].t == 0) continue;
+        const double t = double(hits[i].t) * double(h);
+        const auto at = [&](float o, float d) { return double(o) + double(d) * t; };
+        const dvec3 p{at(rays[i].origin.x, rays[i].direction.x), at(rays[i].origin.y, rays[i].direction.y),
+                      at(rays[i].origin.z, rays[i].direction.z)};
+        ++(std::abs(sdf::evaluate(sdf::view(bricks.field().program()), p)) <= 2e-3 * double(h) ? on : off);
+        // The place in the brick is the place on the ray.
+        const vec3 q{float(hits[i].cell.x * 7 + hits[i].voxel.x) + hits[i].p.x,
+                     float(hits[i].cell.y * 7 + hits[i].voxel.y) + hits[i].p.y,
+                     float(hits[i].cell.z * 7 + hits[i].voxel.z) + hits[i].p.z};
+        EXPECT_LE(length(q * h - vec3{float(p.x), float(p.y), float(p.z)}), 1.6f * h) << i;
+    }
+    EXPECT_GT(on, 1000);
+    EXPECT_LE(off, on / 20);  // grazing; and texels of eight bits are off by 1/64 voxel before
+}
+
 TEST_P(WideInEachFormat, RaysFollowABrickThatWasBakedAgain) {
     std::vector<Edit> edits = mixed();
     HostBricks bricks = bricks_of(GetParam(), edits);
