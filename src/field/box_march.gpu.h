@@ -14,7 +14,9 @@
 // The includer has march.gpu.h before this text. In C++ it is included inside a struct.
 
 // Is the entry of axis a after the exit of axis b?
-KILN_FN bool entry_after_exit(float in_a, int a, float out_b, int b) { return in_a > out_b || (in_a == out_b && a > b); }
+KILN_FN bool entry_after_exit(float in_a, int a, float out_b, int b) {
+    return in_a > out_b || (in_a == out_b && a > b);
+}
 
 // Is this cell (counted from the grid's first, in the grid) on the way? Then `t` is where the walk enters it, and `axis` the axis whose plane
 // it crosses there: -1 in start.cell.
@@ -28,23 +30,26 @@ KILN_FN bool box_march_visits(TexelRay ray, MarchStart start, ivec3 cell, float 
     if (cell.y != start.cell.y && (ray.inverse.y == 0.0f || (cell.y > start.cell.y) != up_y)) return false;
     if (cell.z != start.cell.z && (ray.inverse.z == 0.0f || (cell.z > start.cell.z) != up_z)) return false;
     float in_x = cell.x == start.cell.x ? -kFarVoxels
-                                        : texel_plane_crossing((up_x ? cell.x : cell.x + 1) * kBrickVoxels, start.whole.x,
-                                                               ray.part.x, ray.inverse.x, -kFarVoxels);
+                                        : texel_plane_crossing((up_x ? cell.x : cell.x + 1) * kBrickVoxels,
+                                                               start.whole.x, ray.part.x, ray.inverse.x, -kFarVoxels);
     float in_y = cell.y == start.cell.y ? -kFarVoxels
-                                        : texel_plane_crossing((up_y ? cell.y : cell.y + 1) * kBrickVoxels, start.whole.y,
-                                                               ray.part.y, ray.inverse.y, -kFarVoxels);
+                                        : texel_plane_crossing((up_y ? cell.y : cell.y + 1) * kBrickVoxels,
+                                                               start.whole.y, ray.part.y, ray.inverse.y, -kFarVoxels);
     float in_z = cell.z == start.cell.z ? -kFarVoxels
-                                        : texel_plane_crossing((up_z ? cell.z : cell.z + 1) * kBrickVoxels, start.whole.z,
-                                                               ray.part.z, ray.inverse.z, -kFarVoxels);
+                                        : texel_plane_crossing((up_z ? cell.z : cell.z + 1) * kBrickVoxels,
+                                                               start.whole.z, ray.part.z, ray.inverse.z, -kFarVoxels);
     float out_x = texel_plane_crossing((up_x ? cell.x + 1 : cell.x) * kBrickVoxels, start.whole.x, ray.part.x,
                                        ray.inverse.x, kFarVoxels);
     float out_y = texel_plane_crossing((up_y ? cell.y + 1 : cell.y) * kBrickVoxels, start.whole.y, ray.part.y,
                                        ray.inverse.y, kFarVoxels);
     float out_z = texel_plane_crossing((up_z ? cell.z + 1 : cell.z) * kBrickVoxels, start.whole.z, ray.part.z,
                                        ray.inverse.z, kFarVoxels);
-    if (in_x > -kFarVoxels && (entry_after_exit(in_x, 0, out_y, 1) || entry_after_exit(in_x, 0, out_z, 2))) return false;
-    if (in_y > -kFarVoxels && (entry_after_exit(in_y, 1, out_x, 0) || entry_after_exit(in_y, 1, out_z, 2))) return false;
-    if (in_z > -kFarVoxels && (entry_after_exit(in_z, 2, out_x, 0) || entry_after_exit(in_z, 2, out_y, 1))) return false;
+    if (in_x > -kFarVoxels && (entry_after_exit(in_x, 0, out_y, 1) || entry_after_exit(in_x, 0, out_z, 2)))
+        return false;
+    if (in_y > -kFarVoxels && (entry_after_exit(in_y, 1, out_x, 0) || entry_after_exit(in_y, 1, out_z, 2)))
+        return false;
+    if (in_z > -kFarVoxels && (entry_after_exit(in_z, 2, out_x, 0) || entry_after_exit(in_z, 2, out_y, 1)))
+        return false;
     float last = max(max(in_x, in_y), in_z);
     axis = last == -kFarVoxels ? -1 : (last == in_z ? 2 : (last == in_y ? 1 : 0));
     t = max(start.t, last);

@@ -9,25 +9,13 @@
 
 namespace kiln::render {
 
+// Why no others. Neighbouring cells without bricks share a face of texels and have one sign, and no texel of theirs is nearer than a voxel
+// to 0 (jumps.h). So a walk comes into a solid cell without a brick from a cell with one, across a face, edge or corner all of whose texels
+// are a voxel deep in solid: there the cubic of the last voxel it looked at ends below 0, and the march has ended in it.
 std::vector<uint32_t> box_cells(const field::Field& field) {
-    using field::kCellInside, field::kCellOccupied;
     const field::CellMap& map = field.cells();
     const field::ivec3 size = map.size();
-    const auto solid = [&](int x, int y, int z) {
-        return (map.at(x, y, z) & (kCellOccupied | kCellInside)) == kCellInside;
-    };
-    // A walk enters a cell across a face.
-    const auto beside_other = [&](int x, int y, int z) {
-        return (x > 0 && !solid(x - 1, y, z)) || (x + 1 < size.x && !solid(x + 1, y, z)) ||
-               (y > 0 && !solid(x, y - 1, z)) || (y + 1 < size.y && !solid(x, y + 1, z)) ||
-               (z > 0 && !solid(x, y, z - 1)) || (z + 1 < size.z && !solid(x, y, z + 1));
-    };
     std::vector<uint32_t> out;
-    const auto look = [&](int x, int y, int z) {
-        const uint32_t word = map.at(x, y, z);
-        if ((word & kCellOccupied) == 0 && ((word & kCellInside) == 0 || !beside_other(x, y, z))) return;
-        out.push_back(uint32_t(x) + uint32_t(size.x) * (uint32_t(y) + uint32_t(size.y) * uint32_t(z)));
-    };
     constexpr int kPage = field::kCellPage;
     for (int pz = 0; pz < size.z; pz += kPage)
         for (int py = 0; py < size.y; py += kPage)
@@ -35,7 +23,10 @@ std::vector<uint32_t> box_cells(const field::Field& field) {
                 if (!map.words().find(map.page_index(px / kPage, py / kPage, pz / kPage))) continue;  // empty
                 for (int z = pz; z < std::min(pz + kPage, size.z); ++z)
                     for (int y = py; y < std::min(py + kPage, size.y); ++y)
-                        for (int x = px; x < std::min(px + kPage, size.x); ++x) look(x, y, z);
+                        for (int x = px; x < std::min(px + kPage, size.x); ++x)
+                            if ((map.at(x, y, z) & field::kCellOccupied) != 0)
+                                out.push_back(uint32_t(x) +
+                                              uint32_t(size.x) * (uint32_t(y) + uint32_t(size.y) * uint32_t(z)));
             }
     return out;
 }
@@ -59,8 +50,9 @@ Result<void> GpuBoxes::update(const std::shared_ptr<const field::Field>& field) 
     if (field == field_) return {};
     const field::ivec3 size = field->cells().size();
     if (uint64_t(size.x) * uint64_t(size.y) * uint64_t(size.z) > UINT32_MAX)
-        return Error{formatted("tier rt: a grid of {} x {} x {} cells is more than it can number", size.x, size.y, size.z),
-                     ErrorKind::OutOfMemory};
+        return Error{
+            formatted("tier rt: a grid of {} x {} x {} cells is more than it can number", size.x, size.y, size.z),
+            ErrorKind::OutOfMemory};
     std::vector<uint32_t> cells = box_cells(*field);
     const bool same = tree_ && cells == cells_of_boxes_ && size.x == size_x_ && size.y == size_y_;
     field_ = nullptr;  // until all is done
@@ -77,10 +69,11 @@ Result<void> GpuBoxes::update(const std::shared_ptr<const field::Field>& field) 
     const uint64_t need = device_->box_tree_bytes(uint32_t(cells.size()));
     const uint64_t most = device_->limits().max_buffer;
     if (need > most)
-        return Error{formatted("tier rt: the tree of {} boxes needs {} bytes, a buffer of this device holds {}; a larger "
-                               "voxel size would fit",
-                               cells.size(), need, most),
-                     ErrorKind::OutOfMemory};
+        return Error{
+            formatted("tier rt: the tree of {} boxes needs {} bytes, a buffer of this device holds {}; a larger "
+                      "voxel size would fit",
+                      cells.size(), need, most),
+            ErrorKind::OutOfMemory};
     // Room to grow by half, so that a growing world does not make buffers a frame.
     const uint64_t cell_bytes = cells.size() * sizeof(uint32_t);
     if (tree_bytes_ < need) {
@@ -110,10 +103,10 @@ Result<void> GpuBoxes::update(const std::shared_ptr<const field::Field>& field) 
         const float y = float(int(row % uint32_t(size.y)) * field::kBrickVoxels);
         const float z = float(int(row / uint32_t(size.y)) * field::kBrickVoxels);
         constexpr float kSide = float(field::kBrickVoxels) + field::kBoxMargin;
-        boxes.push_back({x - field::kBoxMargin, y - field::kBoxMargin, z - field::kBoxMargin, x + kSide, y + kSide, z + kSide});
+        boxes.push_back(
+            {x - field::kBoxMargin, y - field::kBoxMargin, z - field::kBoxMargin, x + kSide, y + kSide, z + kSide});
     }
-    if (auto written = device_->write_buffer(cells_, 0, std::as_bytes(std::span(cells))); !written)
-        return written;
+    if (auto written = device_->write_buffer(cells_, 0, std::as_bytes(std::span(cells))); !written) return written;
     Graph g(*runner_);
     Buffer tree = g.import("box tree", tree_);
     g.build_boxes(g.upload("boxes", std::span<const rhi::Box>(boxes)), tree, uint32_t(boxes.size()));

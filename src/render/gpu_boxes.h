@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A field's box tree, for the tier that marches by tracing rays: a box around each cell in which a march may end. Those are the cells with a
-// brick, and solid cells without one beside a cell that is not (a walk enters solid nowhere else). Kept between frames, and built again only
-// when there are other such cells: an edit that changes what bricks hold changes no box. Owner's thread.
+// A field's box tree, for the tier that marches by tracing rays: a box around each cell with a brick. A march may end in a solid cell without
+// one too, but only in the walk's first (proof in gpu_boxes.cpp), at which the shader looks anyway. Kept between frames, and built again only
+// when other cells have bricks: an edit that changes what bricks hold changes no box. Owner's thread.
 #pragma once
 
 #include "field/field.h"

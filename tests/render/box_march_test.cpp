@@ -24,7 +24,8 @@ struct BoxReader {
 };
 
 // What march_trace.rgen and .rint do, with a traversal that knows nothing of order: among equals the last cell offered wins.
-MarchHit march_by_boxes(const HostBricks& bricks, const std::vector<uint32_t>& boxes, const TexelRay& ray, float t_max) {
+MarchHit march_by_boxes(const HostBricks& bricks, const std::vector<uint32_t>& boxes, const TexelRay& ray,
+                        float t_max) {
     BoxReader reader(bricks);
     const GridParams grid = bricks.field().grid();
     const MarchStart start = reader.march_start(grid, ray, 0, t_max);
@@ -61,10 +62,15 @@ TexelRay some_ray(worlds::Random& r, const GridParams& g) {
     if (kind == 2) d = normalize(vec3{sign(), sign(), sign()});
     if (kind == 3) d = normalize(vec3{sign(), sign(), 0});
     if (kind <= 4) target = {std::round(target.x), std::round(target.y), std::round(target.z)};
-    if (kind == 2 || kind == 3) target = {7 * std::round(target.x / 7), 7 * std::round(target.y / 7), 7 * std::round(target.z / 7)};
+    if (kind == 2 || kind == 3)
+        target = {7 * std::round(target.x / 7), 7 * std::round(target.y / 7), 7 * std::round(target.z / 7)};
     const float away = kind == 5 ? 0.0f : kind == 6 ? 20000.0f : kind == 2 || kind == 3 ? 0 : r.in(50, 400);
     vec3 from = target - d * away;
-    if (kind == 2 || kind == 3) from = target - vec3{d.x > 0 ? 70.0f : -70.0f, d.y > 0 ? 70.0f : -70.0f, d.z == 0 ? 0 : d.z > 0 ? 70.0f : -70.0f};
+    if (kind == 2 || kind == 3)
+        from = target - vec3{d.x > 0 ? 70.0f : -70.0f, d.y > 0 ? 70.0f : -70.0f,
+                             d.z == 0  ? 0
+                             : d.z > 0 ? 70.0f
+                                       : -70.0f};
     const ivec3 whole{int(std::floor(from.x)), int(std::floor(from.y)), int(std::floor(from.z))};
     return texel_ray(whole, {from.x - float(whole.x), from.y - float(whole.y), from.z - float(whole.z)}, d);
 }

@@ -54,7 +54,8 @@ struct TiersGpu : GpuTest {
             hits += std::isfinite(b.depth[i]);
             bool equal = std::bit_cast<uint32_t>(a.depth[i]) == std::bit_cast<uint32_t>(b.depth[i]);
             for (size_t c = 0; c < 4; ++c)
-                equal = equal && std::bit_cast<uint32_t>(a.rgba[4 * i + c]) == std::bit_cast<uint32_t>(b.rgba[4 * i + c]);
+                equal =
+                    equal && std::bit_cast<uint32_t>(a.rgba[4 * i + c]) == std::bit_cast<uint32_t>(b.rgba[4 * i + c]);
             differ += !equal;
             apart += a.depth[i] != b.depth[i] && !(std::fabs(a.depth[i] - b.depth[i]) <= 1e-4f * b.depth[i]);
         }
@@ -97,8 +98,8 @@ TEST_F(TiersGpu, RaysThroughBoxesSeeTheWordsOfTheMarch) {
         EXPECT_TRUE(complained("usages Boxes and BoxTree need the capability rt_pipeline"));
         return;
     }
-    for (const auto& world : {field::worlds::sphere_of(10), field::worlds::boxes(), field::worlds::blends(),
-                              field::worlds::thin_walls()}) {
+    for (const auto& world :
+         {field::worlds::sphere_of(10), field::worlds::boxes(), field::worlds::blends(), field::worlds::thin_walls()}) {
         const auto f = world.field();
         GpuField gpu(*runner_);
         rhi::must(gpu.update(f, Baker::Host));

@@ -45,7 +45,8 @@ struct Tools {
         for (const ShaderModule s : {raygen, miss, intersection, closest_hit}) d.destroy(s);
     }
     TracePipelineDesc desc() const {
-        return {.raygen = raygen, .miss = miss, .intersection = intersection, .closest_hit = closest_hit, .label = "boxes"};
+        return {
+            .raygen = raygen, .miss = miss, .intersection = intersection, .closest_hit = closest_hit, .label = "boxes"};
     }
     BindGroup group() {
         const BindGroupEntry entries[] = {{.binding = 0, .buffer = tree}, {.binding = 1, .buffer = met}};
@@ -248,7 +249,8 @@ TEST_F(TiersVulkanGpu, RaysFindTheNearestReportOfTheBoxesTheyMeet) {
             if (count > 1) barrier(e, {.buffer = t.tree, .before = Access::BoxTreeRead, .after = Access::BoxTreeWrite});
             e.build_box_tree(t.tree, t.boxes, 0, count);
             barrier(e, {.buffer = t.tree, .before = Access::BoxTreeWrite, .after = Access::BoxTreeRead});
-            if (count > 1) barrier(e, {.buffer = t.met, .before = Access::CopyRead, .after = Access::StorageWriteCompute});
+            if (count > 1)
+                barrier(e, {.buffer = t.met, .before = Access::CopyRead, .after = Access::StorageWriteCompute});
             t.trace(e);
             barrier(e, {.buffer = t.met, .before = Access::StorageWriteCompute, .after = Access::CopyRead});
             if (count > 1) barrier(e, {.buffer = t.back, .before = Access::HostRead, .after = Access::CopyWrite});
@@ -279,8 +281,8 @@ TEST_F(TiersVulkanGpu, GroupsOfAMeshShaderDrawInOrder) {
                                                        .size = {8, 8},
                                                        .usage = TextureUsage::Color | TextureUsage::CopySrc,
                                                        .label = "color"}));
-    const BufferHandle back = must(d.create_buffer(
-        {.size = 256, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
+    const BufferHandle back = must(
+        d.create_buffer({.size = 256, .usage = BufferUsage::CopyDst, .memory = MemoryKind::Readback, .label = "back"}));
     submit(d, [&](CommandEncoder& e) {
         barrier(e, {.texture = color, .after = Access::ColorWrite});
         const ColorAttachment attachments[] = {{.view = d.whole_view(color)}};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the shaders of "march by boxes" share: the march of the bricks as rays through a box tree, a box a cell in which a march may end.
+// What the shaders of "march by boxes" share: the march of the bricks as rays through a box tree, a box a cell with a brick.
 // A ray's parameter in the tree counts from where it meets the grid, so that coordinates there are small.
 #extension GL_EXT_ray_tracing : require
 #extension GL_GOOGLE_include_directive : require

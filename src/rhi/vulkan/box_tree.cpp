@@ -36,7 +36,8 @@ struct Build {
                                        .data = {.deviceAddress = data},
                                        .stride = sizeof(Box)};
         }
-        info.type = top ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR;
+        info.type =
+            top ? VK_ACCELERATION_STRUCTURE_TYPE_TOP_LEVEL_KHR : VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR;
         info.flags = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR;
         info.mode = VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR;
         info.geometryCount = 1;
@@ -57,8 +58,8 @@ static_assert(sizeof(Box) == sizeof(VkAabbPositionsKHR));
 VulkanDevice::TreeBytes VulkanDevice::tree_bytes(uint32_t boxes) const {
     const Build build(0, boxes == 0);
     const uint32_t count = std::max(boxes, 1u);
-    VkAccelerationStructureBuildSizesInfoKHR sizes{
-        .sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
+    VkAccelerationStructureBuildSizesInfoKHR sizes{.sType =
+                                                       VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
     vk_.vkGetAccelerationStructureBuildSizesKHR(device_, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &build.info,
                                                 &count, &sizes);
     return {sizes.accelerationStructureSize, sizes.buildScratchSize};
@@ -143,7 +144,8 @@ Result<void> VulkanDevice::record_box_tree(VkCommandBuffer cmd, Buffer& tree, co
 Result<TracePipeline> VulkanDevice::create_trace_pipeline(const TracePipelineDesc& desc) {
     if (!caps_.rt_pipeline)
         return Error{formatted("pipeline '{}': the device has no ray-tracing pipelines", desc.label)};
-    Pipeline p{.label = std::string(desc.label), .reflection = {}, .groups = {}, .vk = {}, .layout = {}, .owns_layout = false};
+    Pipeline p{
+        .label = std::string(desc.label), .reflection = {}, .groups = {}, .vk = {}, .layout = {}, .owns_layout = false};
     std::vector<const Reflection*> reflections;
     std::vector<VkPipelineShaderStageCreateInfo> stages;
     for (const ShaderModule module : {desc.raygen, desc.miss, desc.intersection, desc.closest_hit}) {
