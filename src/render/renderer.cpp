@@ -287,13 +287,11 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
 }
 
 Result<void> Renderer::Impl::check_tier(Tier tier) const {
-    const char* lacks = nullptr;
-    if (tier == Tier::Rt && !device->caps().rt_pipeline)
-        lacks = "rt: '{}' has no ray-tracing pipelines (VK_KHR_ray_tracing_pipeline, VK_KHR_acceleration_structure)";
-    if (tier == Tier::Mesh && !device->caps().mesh_shader)
-        lacks = "mesh: '{}' has no mesh shaders (VK_EXT_mesh_shader)";
-    if (!lacks) return {};
-    return Error{"tier " + formatted(lacks, device->info().name) + "; the compute tier draws the same picture",
+    std::string_view lacks;
+    if (tier == Tier::Rt && !device->caps().rt_pipeline) lacks = "tier rt: '{}' has no ray-tracing pipelines";
+    if (tier == Tier::Mesh && !device->caps().mesh_shader) lacks = "tier mesh: '{}' has no mesh shaders";
+    if (lacks.empty()) return {};
+    return Error{formatted(lacks, device->info().name) + "; the compute tier draws the same picture",
                  ErrorKind::NoDevice};
 }
 
