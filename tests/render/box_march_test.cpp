@@ -23,11 +23,39 @@ struct BoxReader {
 #include "field/box_march.gpu.h"
 };
 
+// Bricks that do not fit together: what stands at a corner of one says nothing of its neighbours. So cells that a ray enters at one parameter
+// (through an edge or a corner of the lattice) may all end a march, and only their order says which does.
+struct NoiseReader {
+    static constexpr int kSide = 6;
+    static constexpr GridParams kGrid{-3, -3, -3, 0.1f, kSide, kSide, kSide, 0};
+    static uint32_t hash(uint32_t n) {
+        n = (n ^ (n >> 16)) * 0x7feb352du;
+        n = (n ^ (n >> 15)) * 0x846ca68bu;
+        return n ^ (n >> 16);
+    }
+    static uint field_cell(ivec3 c) {
+        const uint32_t slot = uint32_t(c.x + kSide * (c.y + kSide * c.z));
+        return hash(slot) % 4 != 0 ? kCellOccupied | slot : 0u;
+    }
+    static void field_enter(uint, ivec3) {}
+    static float corner(int slot, int x, int y, int z) {
+        const uint32_t n = hash(uint32_t(slot * 512 + x + 8 * (y + 8 * z)) + 0x9e3779b9u);
+        return n % 9 == 0 ? -0.5f : float(n % 1000) / 1000 + 0.01f;
+    }
+    static Corners field_corners(int slot, ivec3 v) {
+        const auto at = [&](int x, int y, int z) { return corner(slot, v.x + x, v.y + y, v.z + z); };
+        return {at(0, 0, 0), at(1, 0, 0), at(0, 1, 0), at(1, 1, 0), at(0, 0, 1), at(1, 0, 1), at(0, 1, 1), at(1, 1, 1)};
+    }
+    static bool field_voxel_solid(int, ivec3) { return true; }
+#include "field/march.gpu.h"
+
+#include "field/box_march.gpu.h"
+};
+
 // What march_trace.rgen and .rint do, with a traversal that knows nothing of order: among equals the last cell offered wins.
-MarchHit march_by_boxes(const HostBricks& bricks, const std::vector<uint32_t>& boxes, const TexelRay& ray,
+template <typename Reader>
+MarchHit march_by_boxes(Reader& reader, const GridParams& grid, const std::vector<uint32_t>& boxes, const TexelRay& ray,
                         float t_max) {
-    BoxReader reader(bricks);
-    const GridParams grid = bricks.field().grid();
     const MarchStart start = reader.march_start(grid, ray, 0, t_max);
     MarchHit hit = reader.march_miss(t_max);
     if (!start.meets) return hit;
@@ -81,11 +109,12 @@ TEST(BoxMarch, EndsWhereTheWalkEnds) {
     for (const World& world : {sphere_of(10), sphere_of(40), boxes(), blends(), thin_walls()}) {
         const HostBricks bricks = HostBricks::bake(world.field());
         const std::vector<uint32_t> cells = render::box_cells(bricks.field());
+        BoxReader reader(bricks);
         Random r(17);
         for (int i = 0; i < 1500; ++i) {
             const TexelRay ray = some_ray(r, bricks.field().grid());
             const MarchHit walk = bricks.march(ray, 0, kFarVoxels, false);
-            const MarchHit got = march_by_boxes(bricks, cells, ray, kFarVoxels);
+            const MarchHit got = march_by_boxes(reader, bricks.field().grid(), cells, ray, kFarVoxels);
             ASSERT_EQ(got.state, walk.state) << world.name << " ray " << i;
             ASSERT_EQ(got.t, walk.t) << world.name << " ray " << i;
             ASSERT_EQ(got.slot, walk.slot) << world.name << " ray " << i;
@@ -99,6 +128,36 @@ TEST(BoxMarch, EndsWhereTheWalkEnds) {
     EXPECT_GT(hits, 1000);
     EXPECT_GT(insides, 20);
     EXPECT_GT(misses, 100);
+}
+
+TEST(BoxMarch, OfCellsEnteredAtOnceTheWalksFirstCounts) {
+    NoiseReader reader;
+    const GridParams grid = NoiseReader::kGrid;
+    std::vector<uint32_t> up, down;
+    for (uint32_t slot = 0; slot < 216; ++slot)
+        if (NoiseReader::field_cell({int(slot) % 6, int(slot) / 6 % 6, int(slot) / 36}) != 0) up.push_back(slot);
+    down.assign(up.rbegin(), up.rend());
+    worlds::Random r(31);
+    int hits = 0;
+    for (int i = 0; i < 4000; ++i) {
+        // Along diagonals through corners of cells, in all directions; every third ray through edges only.
+        const auto sign = [&] { return r.below(2) == 0 ? 1.0f : -1.0f; };
+        vec3 d{sign(), sign(), sign()};
+        if (i % 3 == 0) d.z = 0;
+        ivec3 from{7 * (r.below(8) - 4), 7 * (r.below(8) - 4), 7 * (r.below(8) - 4)};
+        if (i % 3 == 0) from.z += 3;
+        const TexelRay ray = texel_ray(from, {0, 0, i % 3 == 0 ? 0.4f : 0.0f}, normalize(d));
+        const MarchHit walk = reader.field_march(grid, ray, 0, kFarVoxels, false);
+        hits += walk.state == kMarchHit;
+        for (const auto& boxes : {up, down}) {
+            const MarchHit got = march_by_boxes(reader, grid, boxes, ray, kFarVoxels);
+            ASSERT_EQ(got.state, walk.state) << i;
+            ASSERT_EQ(got.slot, walk.slot) << i;
+            ASSERT_EQ(got.t, walk.t) << i;
+            ASSERT_TRUE(got.voxel == walk.voxel) << i;
+        }
+    }
+    EXPECT_GT(hits, 1000);
 }
 
 // A walk without jumps looks at the cells on the way, in the order of their t: those and no others.
