@@ -2,6 +2,8 @@
 // Tiers above compute give what compute gives. On a device without them the same tests see that they are refused, and say what is missing;
 // tools/tiers runs them on a driver that has them (KILN_TIERS=1: then a device without fails).
 #include "drawables.h"
+#include "field/brick_set.h"
+#include "field/clipmap.h"
 #include "gpu_worlds.h"
 #include "render/graph_plan.h"
 
@@ -156,6 +158,32 @@ TEST_F(TiersGpu, PicturesByRaysAreThoseOfCompute) {
             EXPECT_EQ(a.depth, b.depth);
         }
     }
+}
+
+// What the tier does not march, compute does, and the report says so.
+TEST_F(TiersGpu, LevelsAndInstancesAreMarchedByCompute) {
+    if (!device_->caps().rt_pipeline) return;
+    const auto check = [&](const Frame& frame) {
+        const Picture a = rhi::must(picture(frame, Tier::Rt, View::Depth));
+        EXPECT_EQ(renderer->stats().march_tier, "compute");
+        EXPECT_EQ(renderer->stats().boxes, 0u);
+        EXPECT_EQ(a.depth, rhi::must(picture(frame, Tier::Compute, View::Depth)).depth);
+    };
+    const field::worlds::World world = field::worlds::blends();
+    Frame levels = frame_of(world);
+    auto map =
+        field::Clipmap::make(levels.field->shared_program(), {.voxel_size = 0.05f, .levels = 2, .cells = 32}, {});
+    ASSERT_TRUE(map);
+    map->work();
+    levels.levels = std::make_shared<const field::Clipmap>(std::move(*map));
+    levels.field = nullptr;
+    check(levels);
+    Frame moving = frame_of(world);
+    const auto ball = field::worlds::compiled({field::worlds::edit(Sphere{.radius = 0.2f})});
+    moving.instances.push_back({.bricks = rhi::must(field::BrickSet::make(ball, 0.05f)),
+                                .pose = {.position = {0.4f, 0.3f, 0.5f}},
+                                .before = {.position = {0.4f, 0.3f, 0.5f}}});
+    check(moving);
 }
 
 // An edit that changes what bricks hold, and not where they are, builds nothing.
