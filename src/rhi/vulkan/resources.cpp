@@ -70,6 +70,9 @@ Result<VkBuffer> VulkanDevice::make_buffer(const BufferDesc& desc) {
 
 Result<BufferHandle> VulkanDevice::create_buffer(const BufferDesc& desc) {
     if (desc.size == 0) return Error{quoted("buffer", desc.label) + ": size 0"};
+    if (any(desc.usage & BufferUsage::BoxTree) && desc.size < box_tree_bytes(1))
+        return Error{
+            formatted("buffer '{}': {} B, the least box tree takes {}", desc.label, desc.size, box_tree_bytes(1))};
     if (desc.size > limits_.max_buffer)
         return Error{formatted("buffer '{}': {} B, the device allows {}", desc.label, desc.size, limits_.max_buffer),
                      ErrorKind::OutOfMemory};
