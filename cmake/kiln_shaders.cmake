@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 # Shaders: GLSL -> SPIR-V (glslc) -> checked (spirv-val) -> a generated header `shaders/<stem>.spv.h` with
-# `inline constexpr uint32_t k<CamelStem>Spv[]`. The stem of foo.comp is foo, of foo.vert foo_vert, of foo.frag foo_frag.
+# `inline constexpr uint32_t k<CamelStem>Spv[]`. The stem of foo.comp is foo, of foo.vert foo_vert,
+# of foo.frag foo_frag, and so on.
 
 # kiln_shaders(NAME [FOLDER folder] [TARGET target]): every shader under src/NAME (or FOLDER), made before kiln_NAME (or TARGET) is compiled.
 function(kiln_shaders name)
@@ -9,7 +10,8 @@ function(kiln_shaders name)
         set(arg_FOLDER ${PROJECT_SOURCE_DIR}/src/${name})
         set(arg_TARGET kiln_${name})
     endif()
-    file(GLOB_RECURSE shaders CONFIGURE_DEPENDS ${arg_FOLDER}/*.comp ${arg_FOLDER}/*.vert ${arg_FOLDER}/*.frag)
+    file(GLOB_RECURSE shaders CONFIGURE_DEPENDS ${arg_FOLDER}/*.comp ${arg_FOLDER}/*.vert ${arg_FOLDER}/*.frag
+        ${arg_FOLDER}/*.mesh ${arg_FOLDER}/*.rgen ${arg_FOLDER}/*.rint ${arg_FOLDER}/*.rchit ${arg_FOLDER}/*.rmiss)
     if(NOT shaders)
         return()
     endif()
@@ -50,22 +52,35 @@ function(kiln_shaders name)
             VERBATIM)
         list(APPEND headers ${spv}.h)
         set_property(GLOBAL APPEND PROPERTY KILN_SPIRV ${spv})
+        # HLSL has ray-tracing stages, but spirv-cross does not write them.
+        if(stage MATCHES "^_(rgen|rint|rchit|rmiss)$")
+            set_property(GLOBAL APPEND PROPERTY KILN_SPIRV_RAYS ${spv})
+        endif()
     endforeach()
     add_custom_target(${arg_TARGET}_shaders DEPENDS ${headers})
     add_dependencies(${arg_TARGET} ${arg_TARGET}_shaders)
     target_include_directories(${arg_TARGET} PRIVATE ${KILN_GENERATED})
 endfunction()
 
-# Target kiln_shader_checks: every module through spirv-val and spirv-cross --hlsl (proof that other backends stay possible).
+# Target kiln_shader_checks: every module through spirv-val and, but for those of ray tracing, spirv-cross --hlsl (proof that other backends
+# stay possible; mesh shaders need shader model 6.5 there).
 function(kiln_shader_checks)
     get_property(spirv GLOBAL PROPERTY KILN_SPIRV)
+    get_property(rays GLOBAL PROPERTY KILN_SPIRV_RAYS)
     set(checks)
     foreach(spv IN LISTS spirv)
         list(APPEND checks COMMAND ${KILN_SPIRV_VAL} --target-env vulkan1.3 ${spv})
-        list(APPEND checks COMMAND ${KILN_SPIRV_CROSS} --hlsl --shader-model 60 --output ${spv}.hlsl ${spv})
+        set(model 60)
+        if(spv MATCHES "_mesh[.]spv$")
+            set(model 65)
+        endif()
+        if(NOT spv IN_LIST rays)
+            list(APPEND checks COMMAND ${KILN_SPIRV_CROSS} --hlsl --shader-model ${model} --output ${spv}.hlsl ${spv})
+        endif()
     endforeach()
     list(LENGTH spirv count)
+    list(LENGTH rays left_out)
     add_custom_target(kiln_shader_checks ${checks}
-        COMMAND ${CMAKE_COMMAND} -E echo "${count} shader modules: spirv-val and spirv-cross --hlsl passed"
+        COMMAND ${CMAKE_COMMAND} -E echo "${count} shader modules: spirv-val and spirv-cross --hlsl passed (not --hlsl: ${left_out} of ray tracing)"
         DEPENDS ${spirv} VERBATIM)
 endfunction()

@@ -15,6 +15,15 @@ namespace kiln::cli {
 
 namespace {
 
+// What `render --tier` may be given.
+std::string tiers_of(const DeviceInfo& d, bool json) {
+    std::string out;
+    for (const auto& [name, there] :
+         {std::pair("compute", true), std::pair("rt", d.rt_pipeline), std::pair("mesh", d.mesh_shader)})
+        if (there) out += (out.empty() ? "" : ", ") + (json ? Json::quoted(name) : std::string(name));
+    return json ? "[" + out + "]" : out;
+}
+
 int doctor(bool json) {
     const std::vector<DeviceInfo> found = devices();
     bool usable = false;
@@ -35,6 +44,7 @@ int doctor(bool json) {
             Json one;
             one.text("name", d.name).text("kind", d.kind).text("backend", d.backend).text("driver", d.driver);
             one.text("api_version", d.api_version).flag("usable", d.usable);
+            if (d.usable) one.raw("tiers", tiers_of(d, true));
             if (!d.usable) one.text("why_not", d.why_not);
             list += (list.empty() ? "" : ", ") + one.object();
         }
@@ -51,7 +61,8 @@ int doctor(bool json) {
               " threads\n");
     for (const DeviceInfo& d : found) {
         (void)put((d.usable ? "usable   " : "unusable ") + d.name + " (" + d.kind + ", " + d.backend + " " +
-                  d.api_version + ", " + d.driver + ")" + (d.usable ? "" : ": " + d.why_not) + "\n");
+                  d.api_version + ", " + d.driver + ")" +
+                  (d.usable ? ", tiers " + tiers_of(d, false) : ": " + d.why_not) + "\n");
     }
     for (const PhysicsBackend& b : physics_backends()) {
         (void)put((b.why_not.empty() ? "physics  " : "unusable ") + std::string(b.name) +

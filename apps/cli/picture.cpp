@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kPicturesOfOneView = 16;  // with --taa, a round of the renderer's jitter
 
+constexpr std::string_view kTiers[] = {"auto", "compute", "rt", "mesh"};
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
@@ -47,6 +48,13 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
                      (near.empty() ? "use shaded, albedo, normal, depth, steps, bricks or levels"
                                    : "did you mean " + std::string(near) + "?"));
     }
+    const auto tier = std::find(std::begin(kTiers), std::end(kTiers), o.tier);
+    if (tier == std::end(kTiers)) {
+        const std::string_view near = nearest_word(o.tier, kTiers);
+        return usage("--tier " + o.tier + ": there is no such tier; " +
+                     (near.empty() ? "use auto, compute, rt or mesh" : "did you mean " + std::string(near) + "?"));
+    }
+    s.tier = Tier(tier - std::begin(kTiers));
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
     if (!(o.time >= 0 && o.time <= 1e9)) return usage("--time wants seconds, 0 or more");
@@ -141,6 +149,12 @@ std::string report(const PictureOptions& o, const RenderSettings& s, const Rende
         json.number("triangles", double(stats.triangles))
             .number("triangles_drawn", double(stats.triangles_drawn))
             .number("triangles_culled", double(stats.triangles - stats.triangles_drawn));
+    json.text("march_tier", stats.march_tier);
+    if (stats.triangles > 0) json.text("mesh_tier", stats.mesh_tier);
+    if (stats.boxes > 0)
+        json.number("boxes", stats.boxes)
+            .number("box_tree_builds", double(stats.box_tree_builds))
+            .number("box_tree_bytes", double(stats.box_tree_bytes));
     std::string faults;
     for (const std::string& fault : world.faults()) faults += (faults.empty() ? "" : ", ") + Json::quoted(fault);
     if (!faults.empty()) json.raw("faults", "[" + faults + "]");

@@ -10,7 +10,7 @@
 namespace kiln::cli {
 
 struct PictureOptions {
-    std::string scene, output, camera, size = "1280x720", view = "shaded", device = "auto";
+    std::string scene, output, camera, size = "1280x720", view = "shaded", device = "auto", tier = "auto";
     std::string path;  ///< names of cameras, by commas: a sequence of `frames` pictures along them
     int frames = 0;
     double time = 0;      ///< seconds, of the meshes' animations

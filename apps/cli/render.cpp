@@ -25,6 +25,10 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps, bricks or levels")
         ->capture_default_str();
     verb->add_option("--device", o->device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
+    verb->add_option("--tier", o->tier,
+                     "auto, compute, rt (bricks by a ray-tracing pipeline) or mesh (meshes by a mesh shader): the same "
+                     "picture; refused where the device has none")
+        ->capture_default_str();
     verb->add_option("--path", o->path,
                      "names of the scene's cameras in order, by commas, or all: draws --frames pictures along a smooth "
                      "path through them, OUT_0000.png and so on");

@@ -108,6 +108,11 @@ struct Frame {
     double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
 };
 
+/// Ways to the same picture. Compute is there on every device; the others march the bricks of a world of one level by a ray-tracing
+/// pipeline (Rt) or draw clusters of meshes by a mesh shader (Mesh), and are refused where the device has none. Auto is the fastest way
+/// that was measured, which is Compute on every device so far.
+enum class Tier : uint8_t { Auto, Compute, Rt, Mesh };
+
 struct RenderSettings {
     int width = 1280, height = 720;  ///< pixels, 1 to 16384
     View view = View::Shaded;
@@ -122,6 +127,7 @@ struct RenderSettings {
         true;           ///< … and look through another place of each pixel every time; false: through their middles
     bool cut = false;   ///< taa: this picture follows on none before
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
+    Tier tier = Tier::Auto;
 };
 
 /// Pixels, top row first.
@@ -157,19 +163,25 @@ struct RenderStats {
         bool skipped = false;                          ///< its shell was more than the budget
     };
     std::vector<Level> levels;
-    int instances = 0;                 ///< drawn beside the field
-    uint32_t instance_bricks = 0;      ///< resident, of their sets
-    uint32_t instance_bricks_new = 0;  ///< … of them brought to the device by this frame
-    double instances_ms = 0;           ///< CPU time: their tree and records
-    uint64_t triangles = 0;            ///< of meshes, in the scene
-    uint64_t triangles_drawn = 0;      ///< given to the rasteriser
+    int instances = 0;                   ///< drawn beside the field
+    uint32_t instance_bricks = 0;        ///< resident, of their sets
+    uint32_t instance_bricks_new = 0;    ///< … of them brought to the device by this frame
+    double instances_ms = 0;             ///< CPU time: their tree and records
+    uint64_t triangles = 0;              ///< of meshes, in the scene
+    uint64_t triangles_drawn = 0;        ///< given to the rasteriser
+    std::string march_tier = "compute";  ///< who marched the bricks: "compute", "rt"
+    std::string mesh_tier = "vertex";    ///< who drew meshes, where there are any: "vertex", "mesh"
+    uint32_t boxes = 0;                  ///< in the tree that rays are traced through
+    uint64_t box_tree_builds = 0;        ///< since creation
+    uint64_t box_tree_bytes = 0;
 };
 
 struct DeviceInfo {
     std::string name, backend, driver, kind;  ///< kind: "cpu", "integrated", "discrete", "virtual", "other"
     std::string api_version;
     bool usable = false;
-    std::string why_not;  ///< when not usable
+    std::string why_not;                            ///< when not usable
+    bool mesh_shader = false, rt_pipeline = false;  ///< tiers beside compute
 };
 
 struct RendererOptions {

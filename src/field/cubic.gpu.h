@@ -19,6 +19,10 @@ KILN_CONST float kFarVoxels = 1e30f;
 // How far past its faces a brick is marched: above the rounding of positions in a brick (1e-6), below what counts (1e-4).
 KILN_CONST float kFaceOverlap = 1e-5f;
 
+// How much larger than its cell a box is that stands for it in a traversal (box_march.gpu.h), voxels: covers the rounding of coordinates of
+// rays that begin within 2^18 voxels of the grid.
+KILN_CONST float kBoxMargin = 0.0625f;
+
 // Bernstein coefficients of a cubic on [0, 1].
 struct Cubic {
     float b0, b1, b2, b3;
@@ -189,6 +193,14 @@ KILN_FN ivec3 voxel_at(BrickRay ray, float s) {
     float z = ray_coordinate(0.0f, ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, s);
     return ivec3(int(min(max(x, 0.0f), 6.5f)), int(min(max(y, 0.0f), 6.5f)), int(min(max(z, 0.0f), 6.5f)));
 }
+
+// Where a walk through a grid begins (march_start() of march.gpu.h). Texels and cells count from the grid's first.
+struct MarchStart {
+    bool meets;   // the ray meets the grid at all
+    ivec3 whole;  // of the ray
+    float t;      // voxels along the ray
+    ivec3 cell;
+};
 
 // What field_march() of march.gpu.h answers.
 KILN_CONST int kMarchMiss = 0;

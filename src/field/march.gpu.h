@@ -76,23 +76,18 @@ KILN_FN int cell_at(int whole, float part, float direction, float t) {
     return int(floor((float(whole) + (part + direction * t)) * kCellsPerVoxel));
 }
 
-// First hit between t_min >= 0 and t_max (voxels). `accelerate` false visits every cell.
-KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t_max, bool accelerate) {
-    MarchHit hit;
-    hit.state = kMarchMiss;
-    hit.t = t_max;
-    hit.slot = -1;
-    hit.cell = ivec3(0, 0, 0);
-    hit.voxel = ivec3(0, 0, 0);
-    hit.p = vec3(0.0f, 0.0f, 0.0f);
-    hit.cells = 0;
-    hit.voxels = 0;
+// Where the walk of a ray through the grid begins.
+KILN_FN MarchStart march_start(GridParams grid, TexelRay ray, float t_min, float t_max) {
+    MarchStart start;
+    start.meets = false;
+    start.whole = ivec3(ray.whole.x - grid.cell_x * kBrickVoxels, ray.whole.y - grid.cell_y * kBrickVoxels,
+                        ray.whole.z - grid.cell_z * kBrickVoxels);
+    start.t = t_min;
+    start.cell = ivec3(0, 0, 0);
     bool up_x = ray.inverse.x > 0.0f;
     bool up_y = ray.inverse.y > 0.0f;
     bool up_z = ray.inverse.z > 0.0f;
-    // From here on, texels and cells count from the grid's first.
-    ivec3 whole = ivec3(ray.whole.x - grid.cell_x * kBrickVoxels, ray.whole.y - grid.cell_y * kBrickVoxels,
-                        ray.whole.z - grid.cell_z * kBrickVoxels);
+    ivec3 whole = start.whole;
     float t = t_min;
     t = max(t, texel_plane_crossing(up_x ? 0 : grid.size_x * kBrickVoxels, whole.x, ray.part.x, ray.inverse.x,
                                     -kFarVoxels));
@@ -107,48 +102,76 @@ KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t
                                         kFarVoxels));
     end = min(end, texel_plane_crossing(up_z ? grid.size_z * kBrickVoxels : 0, whole.z, ray.part.z, ray.inverse.z,
                                         kFarVoxels));
-    if (!(t <= end)) return hit;
+    if (!(t <= end)) return start;
     ivec3 cell;
     cell.x = cell_at(whole.x, ray.part.x, ray.direction.x, t);
     cell.y = cell_at(whole.y, ray.part.y, ray.direction.y, t);
     cell.z = cell_at(whole.z, ray.part.z, ray.direction.z, t);
-    if (ray.direction.x == 0.0f && (cell.x < 0 || cell.x >= grid.size_x)) return hit;
-    if (ray.direction.y == 0.0f && (cell.y < 0 || cell.y >= grid.size_y)) return hit;
-    if (ray.direction.z == 0.0f && (cell.z < 0 || cell.z >= grid.size_z)) return hit;
+    if (ray.direction.x == 0.0f && (cell.x < 0 || cell.x >= grid.size_x)) return start;
+    if (ray.direction.y == 0.0f && (cell.y < 0 || cell.y >= grid.size_y)) return start;
+    if (ray.direction.z == 0.0f && (cell.z < 0 || cell.z >= grid.size_z)) return start;
     // On the other axes rounding may have put it just outside.
-    cell.x = min(max(cell.x, 0), grid.size_x - 1);
-    cell.y = min(max(cell.y, 0), grid.size_y - 1);
-    cell.z = min(max(cell.z, 0), grid.size_z - 1);
+    start.cell.x = min(max(cell.x, 0), grid.size_x - 1);
+    start.cell.y = min(max(cell.y, 0), grid.size_y - 1);
+    start.cell.z = min(max(cell.z, 0), grid.size_z - 1);
+    start.t = t;
+    start.meets = true;
+    return start;
+}
+
+KILN_FN MarchHit march_miss(float t_max) {
+    MarchHit hit;
+    hit.state = kMarchMiss;
+    hit.t = t_max;
+    hit.slot = -1;
+    hit.cell = ivec3(0, 0, 0);
+    hit.voxel = ivec3(0, 0, 0);
+    hit.p = vec3(0.0f, 0.0f, 0.0f);
+    hit.cells = 0;
+    hit.voxels = 0;
+    return hit;
+}
+
+// Does the march end in this cell (counted from the grid's first), which has this word and which the ray enters at t? Then `hit` says how.
+// A pure function of ray and cell: it does not matter where the ray was before.
+KILN_FN bool march_cell(GridParams grid, TexelRay ray, ivec3 cell, uint word, float t, float t_min, float t_max,
+                        KILN_INOUT(MarchHit) hit) {
+    if ((word & (kCellOccupied | kCellInside)) == 0u) return false;
+    ivec3 world = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
+    if ((word & kCellOccupied) != 0u && word != kCellMissing) {
+        ivec3 texel = ivec3(world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels);
+        int slot = int(word & kCellSlotMask);
+        field_enter(word, texel);
+        if (!march_brick(brick_ray(ray, texel), slot, t_min, t_max, hit)) return false;
+        hit.state = kMarchHit;
+        hit.slot = slot;
+    } else {
+        hit.state = word == kCellMissing ? kMarchMissing : kMarchInside;
+        hit.t = t;
+    }
+    hit.cell = world;
+    return true;
+}
+
+// First hit between t_min >= 0 and t_max (voxels). `accelerate` false visits every cell.
+KILN_FN MarchHit field_march(GridParams grid, TexelRay ray, float t_min, float t_max, bool accelerate) {
+    MarchHit hit = march_miss(t_max);
+    MarchStart start = march_start(grid, ray, t_min, t_max);
+    if (!start.meets) return hit;
+    bool up_x = ray.inverse.x > 0.0f;
+    bool up_y = ray.inverse.y > 0.0f;
+    bool up_z = ray.inverse.z > 0.0f;
+    // From here on, texels and cells count from the grid's first.
+    ivec3 whole = start.whole;
+    float t = start.t;
+    ivec3 cell = start.cell;
     int most = grid.size_x + grid.size_y + grid.size_z + 3;
     for (int i = 0; i < most; i++) {
         hit.cells++;
         uint word = field_cell(cell);
-        int reach = 0;  // cells around this one that are empty too
-        if ((word & kCellOccupied) != 0u) {
-            ivec3 world = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
-            ivec3 texel = ivec3(world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels);
-            if (word == kCellMissing) {
-                hit.state = kMarchMissing;
-                hit.t = t;
-                hit.cell = world;
-                return hit;
-            }
-            int slot = int(word & kCellSlotMask);
-            field_enter(word, texel);
-            if (march_brick(brick_ray(ray, texel), slot, t_min, t_max, hit)) {
-                hit.state = kMarchHit;
-                hit.slot = slot;
-                hit.cell = world;
-                return hit;
-            }
-        } else if ((word & kCellInside) != 0u) {
-            hit.state = kMarchInside;
-            hit.t = t;
-            hit.cell = ivec3(cell.x + grid.cell_x, cell.y + grid.cell_y, cell.z + grid.cell_z);
-            return hit;
-        } else if (accelerate) {
-            reach = max(int(word & 7u) - 1, 0);
-        }
+        if (march_cell(grid, ray, cell, word, t, t_min, t_max, hit)) return hit;
+        // Cells around this one that are empty too.
+        int reach = accelerate && (word & kCellOccupied) == 0u ? max(int(word & 7u) - 1, 0) : 0;
         // Leave the cube of empty cells around this one.
         int out_cell_x = up_x ? cell.x + reach + 1 : cell.x - reach;
         int out_cell_y = up_y ? cell.y + reach + 1 : cell.y - reach;

@@ -177,7 +177,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
-    if (!in.analytic) out.push_back(in.levels ? &kMarchLevels : &kMarch);
+    if (!in.analytic && !in.rt) out.push_back(in.levels ? &kMarchLevels : &kMarch);
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
@@ -205,7 +205,13 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
 
 std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
     if (!in.has_meshes) return {};
+    if (in.mesh_shader) return {&kMeshOneSidedGroups, &kMeshDoubleSidedGroups, &kMeshMaskedGroups};
     return {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
+}
+
+std::vector<const TraceKernel*> frame_trace_kernels(const TileInputs& in) {
+    if (!in.rt) return {};
+    return {&kMarchTrace};
 }
 
 }  // namespace kiln::render

@@ -34,5 +34,6 @@ TileResult record_tile(Graph& g, const TileInputs& in, View view, std::span<cons
 // Kernels of a frame, for warm-up.
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view);
 std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in);
+std::vector<const TraceKernel*> frame_trace_kernels(const TileInputs& in);
 
 }  // namespace kiln::render

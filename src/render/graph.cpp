@@ -297,7 +297,7 @@ bool Graph::bind_one(GraphPass& pass, const rhi::ReflectedBinding& b, const Use&
     if (b.array_count != 1) return wrong("arrays of bindings can't be bound by a list");
     BoundUse bound{b.set, b.binding, use, b.dimension, false};
     const bool buffer_kind = b.kind == BindingKind::UniformBuffer || b.kind == BindingKind::StorageBuffer ||
-                             b.kind == BindingKind::StorageBufferReadOnly;
+                             b.kind == BindingKind::StorageBufferReadOnly || b.kind == BindingKind::BoxTree;
 
     if (b.kind == BindingKind::Sampler) {
         if (use.kind != Use::Kind::Sampler)
@@ -350,6 +350,10 @@ bool Graph::bind_one(GraphPass& pass, const rhi::ReflectedBinding& b, const Use&
     case BindingKind::SampledTexture:
         if (use.kind != Use::Kind::Read) return wrong("the shader only reads it: use read() or sampled()");
         access = graphics ? Access::SampledReadGraphics : Access::SampledReadCompute;
+        break;
+    case BindingKind::BoxTree:
+        if (use.kind != Use::Kind::Read) return wrong("the shader only reads it: use read()");
+        access = Access::BoxTreeRead;
         break;
     case BindingKind::Sampler:
         break;
@@ -508,6 +512,36 @@ void Graph::draw_bytes(const RasterKernel& kernel, Targets targets, const Uses& 
     targets.depth.image = nullptr;
     command.targets = std::move(targets);
     pass.command = std::move(command);
+    add(std::move(pass));
+}
+
+void Graph::trace(const TraceKernel& kernel, rhi::Extent size, const Uses& uses) {
+    std::string wrong;
+    const rhi::Reflection* reflection = reflections_->of(kernel, wrong);
+    if (!reflection) return error(wrong);
+    GraphPass pass{.name = std::string(kernel.name)};
+    TraceCommand command{.kernel = &kernel, .width = size.width, .height = size.height};
+    if (uint64_t{size.width} * size.height > rhi::kMaxRays)
+        return error(
+            formatted("pass '{}': {}x{} rays; there may be {}", pass.name, size.width, size.height, rhi::kMaxRays));
+    if (!bind(pass, *reflection, uses, {}, command.bindings, command.push, false)) return;
+    pass.command = std::move(command);
+    add(std::move(pass));
+}
+
+void Graph::build_boxes(const Buffer& boxes, Buffer& tree, uint32_t count) {
+    if (!current(boxes, "build from") || !bump(tree, "build")) return;
+    const GraphResource &from = resources_[boxes.id], &to = resources_[tree.id];
+    GraphPass pass{.name = formatted("build {}", to.name)};
+    if (count == 0 || count > from.bytes / sizeof(rhi::Box))
+        return error(formatted("pass '{}': {} boxes of '{}', which has room for {}", pass.name, count, from.name,
+                               from.bytes / sizeof(rhi::Box)));
+    if (to.origin != GraphResource::Origin::Imported)
+        return error(formatted("pass '{}': a box tree is imported, in memory of its own", pass.name));
+    if (!touch(pass, boxes.id, kAll, Access::BoxesRead, true, false) ||
+        !touch(pass, tree.id, kAll, Access::BoxTreeWrite, false, true))
+        return;
+    pass.command = BuildCommand{.boxes = boxes.id, .tree = tree.id, .count = count};
     add(std::move(pass));
 }
 

@@ -179,8 +179,8 @@ struct Targets {
     DepthUse depth = {};
 };
 struct DrawCall {
-    uint32_t vertices = 0;  // indices, with an index buffer
-    uint32_t instances = 1;
+    uint32_t vertices = 0;      // indices, with an index buffer; with a mesh shader, workgroups along x
+    uint32_t instances = 1;     // with a mesh shader, workgroups along y
     uint32_t first_vertex = 0;  // first index, with an index buffer
     uint32_t first_instance = 0;
     Buffer vertex_buffer = {};    // slot 0; none: the shader pulls
@@ -251,6 +251,16 @@ struct DrawCommand {
     uint32_t depth_id = ~0u;
     std::vector<DrawCall> draws = {};
 };
+struct TraceCommand {
+    const TraceKernel* kernel = nullptr;
+    std::vector<BoundUse> bindings = {};
+    std::vector<std::byte> push = {};
+    uint32_t width = 0, height = 0;
+};
+struct BuildCommand {
+    uint32_t boxes = 0, tree = 0;  // resources
+    uint32_t count = 0;
+};
 struct CopyCommand {
     uint32_t src = 0, dst = 0;                          // resources
     uint64_t src_offset = 0, dst_offset = 0, size = 0;  // buffer to buffer
@@ -268,7 +278,7 @@ struct GraphPass {
     std::string name = {};
     std::vector<GraphAccess> accesses =
         {};  // at most one a subresource once normalised; reads of one subresource are or-ed
-    std::variant<DispatchCommand, DrawCommand, CopyCommand, ClearCommand> command = {};
+    std::variant<DispatchCommand, DrawCommand, CopyCommand, ClearCommand, TraceCommand, BuildCommand> command = {};
     bool keep = false;
 };
 
@@ -351,6 +361,10 @@ public:
     void draw(const RasterKernel& kernel, Targets targets, Uses uses, std::span<const DrawCall> draws) {
         draw_bytes(kernel, std::move(targets), uses, {}, draws);
     }
+    // Rays of size.width x size.height through box trees, which the kernel reads as buffers.
+    void trace(const TraceKernel& kernel, rhi::Extent size, const Uses& uses);
+    // Makes `tree` (imported: it stays) one of the first `count` of `boxes`, each an rhi::Box.
+    void build_boxes(const Buffer& boxes, Buffer& tree, uint32_t count);
     void copy(const Buffer& src, Image& dst, std::span<const CopyRegion> regions);
     void copy(const Image& src, Buffer& dst, std::span<const CopyRegion> regions);
     void copy(const Image& src, Image& dst, std::span<const CopyRegion> regions);

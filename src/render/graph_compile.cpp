@@ -268,6 +268,8 @@ rhi::BufferUsage buffer_usage(Access a) {
     if (any(a & Access::VertexRead)) out |= U::Vertex;
     if (any(a & Access::CopyRead)) out |= U::CopySrc;
     if (any(a & Access::CopyWrite)) out |= U::CopyDst;
+    if (any(a & Access::BoxesRead)) out |= U::Boxes;
+    if (any(a & (Access::BoxTreeRead | Access::BoxTreeWrite))) out |= U::BoxTree;
     return out;
 }
 

@@ -4,6 +4,7 @@
 #include "base/log.h"
 
 #include <algorithm>
+#include <optional>
 
 namespace kiln::render {
 
@@ -69,24 +70,34 @@ const rhi::Reflection* Reflections::of(const Kernel& kernel, std::string& error)
 }
 
 const rhi::Reflection* Reflections::of(const RasterKernel& kernel, std::string& error) {
-    const auto known = entries_.find(kernel.name);
+    return folded(kernel.name, kernel.words(), {kernel.vertex, kernel.mesh, kernel.fragment}, error);
+}
+
+const rhi::Reflection* Reflections::of(const TraceKernel& kernel, std::string& error) {
+    return folded(kernel.name, kernel.raygen.data(),
+                  {kernel.raygen, kernel.miss, kernel.intersection, kernel.closest_hit}, error);
+}
+
+const rhi::Reflection* Reflections::folded(std::string_view name, const uint32_t* words,
+                                           std::initializer_list<std::span<const uint32_t>> stages,
+                                           std::string& error) {
+    const auto known = entries_.find(name);
     if (known != entries_.end()) {
-        if (known->second.words.data() == kernel.vertex.data()) return known->second.reflection.get();
-        error = formatted("two kernels are called '{}'", kernel.name);
+        if (known->second.words.data() == words) return known->second.reflection.get();
+        error = formatted("two kernels are called '{}'", name);
         return nullptr;
     }
-    auto both = std::make_unique<rhi::Reflection>();
-    for (const auto& words : {kernel.vertex, kernel.fragment}) {
-        if (words.empty()) continue;
-        Result<rhi::Reflection> reflection = rhi::reflect_spirv(words);
+    auto all = std::make_unique<rhi::Reflection>();
+    for (const std::span<const uint32_t> stage : stages) {
+        if (stage.empty()) continue;
+        Result<rhi::Reflection> reflection = rhi::reflect_spirv(stage);
         if (!reflection) {
-            error = formatted("kernel '{}': {}", kernel.name, reflection.error().message);
+            error = formatted("kernel '{}': {}", name, reflection.error().message);
             return nullptr;
         }
-        fold(*both, *reflection);
+        fold(*all, *reflection);
     }
-    return entries_.emplace(std::string(kernel.name), Entry{kernel.vertex, std::move(both)})
-        .first->second.reflection.get();
+    return entries_.emplace(std::string(name), Entry{{words, 1}, std::move(all)}).first->second.reflection.get();
 }
 
 void Reflections::forget(std::string_view name) {
@@ -98,14 +109,18 @@ void Reflections::forget(std::string_view name) {
 PipelineLibrary::~PipelineLibrary() {
     for (const auto& [name, c] : compute_) device_->destroy(c.pipeline);
     for (const auto& [name, r] : raster_) device_->destroy(r.pipeline);
+    for (const auto& [name, t] : traces_) device_->destroy(t.pipeline);
 }
 
 Result<void> PipelineLibrary::warm_up(std::span<const Kernel* const> kernels,
-                                      std::span<const RasterKernel* const> raster) {
+                                      std::span<const RasterKernel* const> raster,
+                                      std::span<const TraceKernel* const> traces) {
     warm_ = false;
     for (const Kernel* kernel : kernels)
         if (const auto p = get(*kernel); !p) return p.error();
     for (const RasterKernel* kernel : raster)
+        if (const auto p = get(*kernel); !p) return p.error();
+    for (const TraceKernel* kernel : traces)
         if (const auto p = get(*kernel); !p) return p.error();
     warm_ = true;
     return {};
@@ -139,34 +154,75 @@ Result<rhi::ComputePipeline> PipelineLibrary::get(const Kernel& kernel) {
     return *pipeline;
 }
 
+namespace {
+
+// Shader modules of one pipeline, gone with this.
+class Modules {
+public:
+    Modules(rhi::Device& device, std::string_view label) : device_(device), label_(label) {}
+    ~Modules() {
+        for (const rhi::ShaderModule module : made_) device_.destroy(module);
+    }
+    Modules(const Modules&) = delete;
+    Modules& operator=(const Modules&) = delete;
+
+    // None of no words.
+    rhi::ShaderModule of(std::span<const uint32_t> words) {
+        if (words.empty() || fault_) return {};
+        const auto module = device_.create_shader_module({.spirv = words, .label = label_});
+        if (!module) return fault_ = module.error(), rhi::ShaderModule{};
+        made_.push_back(*module);
+        return *module;
+    }
+    const std::optional<Error>& fault() const { return fault_; }
+
+private:
+    rhi::Device& device_;
+    std::string_view label_;
+    std::vector<rhi::ShaderModule> made_;
+    std::optional<Error> fault_;
+};
+
+}  // namespace
+
 Result<rhi::RenderPipeline> PipelineLibrary::get(const RasterKernel& kernel) {
     if (const auto it = raster_.find(kernel.name); it != raster_.end()) {
-        if (it->second.words == kernel.vertex.data()) return it->second.pipeline;
+        if (it->second.words == kernel.words()) return it->second.pipeline;
         return Error{formatted("two kernels are called '{}'", kernel.name)};
     }
-    const auto vertex = device_->create_shader_module({.spirv = kernel.vertex, .label = kernel.name});
-    if (!vertex) return vertex.error();
-    rhi::ShaderModule fragment;
-    if (!kernel.fragment.empty()) {
-        const auto made = device_->create_shader_module({.spirv = kernel.fragment, .label = kernel.name});
-        if (!made) {
-            device_->destroy(*vertex);
-            return made.error();
-        }
-        fragment = *made;
-    }
-    const auto pipeline = device_->create_render_pipeline({.vertex = *vertex,
-                                                           .fragment = fragment,
-                                                           .vertex_buffers = kernel.vertex_buffers,
-                                                           .topology = kernel.topology,
-                                                           .cull = kernel.cull,
-                                                           .colors = kernel.colors,
-                                                           .depth = kernel.depth,
-                                                           .label = kernel.name});
-    device_->destroy(*vertex);
-    if (fragment) device_->destroy(fragment);
+    Modules modules(*device_, kernel.name);
+    rhi::RenderPipelineDesc desc{.vertex = modules.of(kernel.vertex),
+                                 .fragment = modules.of(kernel.fragment),
+                                 .vertex_buffers = kernel.vertex_buffers,
+                                 .topology = kernel.topology,
+                                 .cull = kernel.cull,
+                                 .colors = kernel.colors,
+                                 .depth = kernel.depth,
+                                 .label = kernel.name};
+    desc.mesh = modules.of(kernel.mesh);
+    if (modules.fault()) return *modules.fault();
+    const auto pipeline = device_->create_render_pipeline(desc);
     if (!pipeline) return pipeline.error();
-    raster_.emplace(std::string(kernel.name), Raster{.words = kernel.vertex.data(), .pipeline = *pipeline});
+    raster_.emplace(std::string(kernel.name), Raster{.words = kernel.words(), .pipeline = *pipeline});
+    count(kernel.name);
+    return *pipeline;
+}
+
+Result<rhi::TracePipeline> PipelineLibrary::get(const TraceKernel& kernel) {
+    if (const auto it = traces_.find(kernel.name); it != traces_.end()) {
+        if (it->second.words == kernel.raygen.data()) return it->second.pipeline;
+        return Error{formatted("two kernels are called '{}'", kernel.name)};
+    }
+    Modules modules(*device_, kernel.name);
+    const rhi::TracePipelineDesc desc{.raygen = modules.of(kernel.raygen),
+                                      .miss = modules.of(kernel.miss),
+                                      .intersection = modules.of(kernel.intersection),
+                                      .closest_hit = modules.of(kernel.closest_hit),
+                                      .label = kernel.name};
+    if (modules.fault()) return *modules.fault();
+    const auto pipeline = device_->create_trace_pipeline(desc);
+    if (!pipeline) return pipeline.error();
+    traces_.emplace(std::string(kernel.name), Trace{.words = kernel.raygen.data(), .pipeline = *pipeline});
     count(kernel.name);
     return *pipeline;
 }

@@ -5,6 +5,7 @@
 
 #include "rhi/device.h"
 
+#include <initializer_list>
 #include <map>
 #include <memory>
 #include <string>
@@ -32,6 +33,19 @@ struct RasterKernel {
     std::span<const rhi::VertexBufferLayout> vertex_buffers = {};
     rhi::Topology topology = rhi::Topology::TriangleList;
     rhi::Cull cull = rhi::Cull::None;
+    // Instead of `vertex`: draws count workgroups of it.
+    std::span<const uint32_t> mesh = {};
+    // Identifies the kernel.
+    const uint32_t* words() const { return mesh.empty() ? vertex.data() : mesh.data(); }
+};
+
+// Rays through box trees; see rhi::TracePipelineDesc.
+struct TraceKernel {
+    std::string_view name;
+    std::span<const uint32_t> raygen;
+    std::span<const uint32_t> miss;
+    std::span<const uint32_t> intersection;
+    std::span<const uint32_t> closest_hit;
 };
 
 // What kernels say about their bindings. Needs no device. Reflects each kernel once.
@@ -40,6 +54,7 @@ public:
     // Vertex and fragment stages of one pipeline are folded into one list of bindings. Null with `error` set for bad SPIR-V.
     const rhi::Reflection* of(const Kernel& kernel, std::string& error);
     const rhi::Reflection* of(const RasterKernel& kernel, std::string& error);
+    const rhi::Reflection* of(const TraceKernel& kernel, std::string& error);
     void forget(std::string_view name);
 
 private:
@@ -47,6 +62,8 @@ private:
         std::span<const uint32_t> words;
         std::unique_ptr<rhi::Reflection> reflection;
     };
+    const rhi::Reflection* folded(std::string_view name, const uint32_t* words,
+                                  std::initializer_list<std::span<const uint32_t>> stages, std::string& error);
     std::map<std::string, Entry, std::less<>> entries_;
 };
 
@@ -59,9 +76,11 @@ public:
     PipelineLibrary& operator=(const PipelineLibrary&) = delete;
 
     // Makes what is missing. From now on a pipeline made on demand counts as made_late().
-    Result<void> warm_up(std::span<const Kernel* const> kernels, std::span<const RasterKernel* const> raster = {});
+    Result<void> warm_up(std::span<const Kernel* const> kernels, std::span<const RasterKernel* const> raster = {},
+                         std::span<const TraceKernel* const> traces = {});
     Result<rhi::ComputePipeline> get(const Kernel& kernel);
     Result<rhi::RenderPipeline> get(const RasterKernel& kernel);
+    Result<rhi::TracePipeline> get(const TraceKernel& kernel);
 
     // Other words for the kernel of this name, from the next frame on. The bindings, push data and workgroup must be the
     // same, otherwise an error says which differ and the old pipeline stays.
@@ -79,12 +98,17 @@ private:
         const uint32_t* words;
         rhi::RenderPipeline pipeline = {};
     };
+    struct Trace {
+        const uint32_t* words;
+        rhi::TracePipeline pipeline = {};
+    };
     Result<rhi::ComputePipeline> make(const Kernel& kernel, std::span<const uint32_t> spirv);
     void count(std::string_view name);
 
     rhi::Device* device_;
     std::map<std::string, Compute, std::less<>> compute_;
     std::map<std::string, Raster, std::less<>> raster_;
+    std::map<std::string, Trace, std::less<>> traces_;
     uint64_t made_ = 0, made_late_ = 0;
     bool warm_ = false;
 };

@@ -79,6 +79,7 @@ struct Runner::Impl {
     struct Prepared {  // of one pass, made ahead of recording
         rhi::ComputePipeline compute = {};
         rhi::RenderPipeline render = {};
+        rhi::TracePipeline trace = {};
         std::vector<std::pair<uint32_t, rhi::BindGroup>> groups = {};
         std::vector<rhi::ColorAttachment> colors = {};
         rhi::DepthAttachment depth = {};
@@ -365,6 +366,14 @@ Result<Runner::Impl::Prepared> Runner::Impl::prepare(const GraphPass& pass, uint
             d->bindings, [&](uint32_t set) { return device.group_layout(out.compute, set); }, pass.name, block_base);
         if (!groups) return groups.error();
         out.groups = std::move(*groups);
+    } else if (const auto* t = std::get_if<TraceCommand>(&pass.command)) {
+        const auto pipeline = pipelines.get(*t->kernel);
+        if (!pipeline) return pipeline.error();
+        out.trace = *pipeline;
+        auto groups = bind_groups(
+            t->bindings, [&](uint32_t set) { return device.group_layout(out.trace, set); }, pass.name, block_base);
+        if (!groups) return groups.error();
+        out.groups = std::move(*groups);
     } else if (const auto* draw = std::get_if<DrawCommand>(&pass.command)) {
         const auto pipeline = pipelines.get(*draw->kernel);
         if (!pipeline) return pipeline.error();
@@ -438,7 +447,9 @@ void Runner::Impl::record(rhi::CommandEncoder& encoder, const GraphPass& pass, c
         for (const DrawCall& call : d->draws) {
             if (call.vertex_buffer) render.set_vertex_buffer(0, buffers[call.vertex_buffer.id]);
             if (call.index_buffer) render.set_index_buffer(buffers[call.index_buffer.id]);
-            if (call.indirect_buffer && call.index_buffer) {
+            if (!d->kernel->mesh.empty()) {
+                render.draw_mesh_groups(call.vertices, call.instances);
+            } else if (call.indirect_buffer && call.index_buffer) {
                 render.draw_indexed_indirect(buffers[call.indirect_buffer.id], call.indirect_offset);
             } else if (call.indirect_buffer) {
                 render.draw_indirect(buffers[call.indirect_buffer.id], call.indirect_offset);
@@ -451,7 +462,17 @@ void Runner::Impl::record(rhi::CommandEncoder& encoder, const GraphPass& pass, c
         render.end();
         return;
     }
+    if (const auto* t = std::get_if<TraceCommand>(&pass.command)) {
+        rhi::ComputePass& compute = encoder.begin_compute(pass.name);
+        compute.set_pipeline(prepared.trace);
+        for (const auto& [set, group] : prepared.groups) compute.set_bind_group(set, group);
+        compute.trace(t->width, t->height);
+        compute.end();
+        return;
+    }
     encoder.push_label(pass.name);
+    if (const auto* b = std::get_if<BuildCommand>(&pass.command))
+        encoder.build_box_tree(buffers[b->tree], buffers[b->boxes], 0, b->count);
     if (const auto* c = std::get_if<CopyCommand>(&pass.command)) {
         const bool from_image = plan.resources[c->src].is_image, to_image = plan.resources[c->dst].is_image;
         if (!from_image && !to_image)

@@ -6,6 +6,7 @@
 #include "base/log.h"
 #include "field/field.h"
 #include "render/frame.h"
+#include "render/gpu_boxes.h"
 #include "render/lens.h"
 #include "render/merged.h"
 #include "render/graph_runner.h"
@@ -43,7 +44,8 @@ struct Renderer::Impl {
     std::unique_ptr<GpuField> field;
     std::unique_ptr<GpuInstances> instances;
     std::unique_ptr<GpuMeshes> meshes;
-    std::string fault;  // first message of the device since the last call
+    std::unique_ptr<GpuBoxes> boxes;  // once a frame asked for the tier
+    std::string fault;                // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
     rhi::BufferHandle exposure;
@@ -61,6 +63,7 @@ struct Renderer::Impl {
 
     ~Impl() {
         instances.reset();
+        boxes.reset();
         field.reset();
         meshes.reset();
         for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
@@ -119,8 +122,16 @@ struct Renderer::Impl {
         in.has_instances = !frame.instances.empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
+        in.rt = traces(frame, settings) && boxes->boxes() > 0;
+        in.mesh_shader = settings.tier == Tier::Mesh;
         return in;
     }
+    // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
+    static bool traces(const Frame& frame, const RenderSettings& settings) {
+        return settings.tier == Tier::Rt && !settings.analytic && frame.field && frame.instances.empty();
+    }
+    // Has the device what this tier needs?
+    Result<void> check_tier(Tier tier) const;
     void add_times(const FrameTimes& times);
     // What the device complained about, as this call's error.
     Result<void> healthy() {
@@ -218,6 +229,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
             in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
                                               params.width, params.height));
         in.meshes = meshes->import(g);
+        if (in.rt) in.boxes = boxes->import(g);
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -274,6 +286,15 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     return {};
 }
 
+Result<void> Renderer::Impl::check_tier(Tier tier) const {
+    std::string_view lacks;
+    if (tier == Tier::Rt && !device->caps().rt_pipeline) lacks = "tier rt: '{}' has no ray-tracing pipelines";
+    if (tier == Tier::Mesh && !device->caps().mesh_shader) lacks = "tier mesh: '{}' has no mesh shaders";
+    if (lacks.empty()) return {};
+    return Error{formatted(lacks, device->info().name) + "; the compute tier draws the same picture",
+                 ErrorKind::NoDevice};
+}
+
 Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSettings& settings) {
     auto field_of_all = merged_field(frame);
     if (!field_of_all) return Error{"analytic: " + field_of_all.error().message, field_of_all.error().kind};
@@ -309,12 +330,17 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                 "it has registers); draw it from bricks",
                 ErrorKind::Usage};
     }
+    if (auto can = check_tier(settings.tier); !can) return can.error();
     instances->reserve(frame.instances);
     if (auto updated = levels ? field->update(*frame.levels)
                               : field->update(frame.field, settings.atlas_by_copy ? Baker::Copy : Baker::Auto);
         !updated)
         return updated.error();
     if (auto updated = instances->update(frame.instances); !updated) return updated.error();
+    if (traces(frame, settings)) {
+        if (!boxes) boxes = std::make_unique<GpuBoxes>(*runner);
+        if (auto updated = boxes->update(frame.field); !updated) return updated.error();
+    }
     outlined = {};
     if (settings.view == View::Shaded && !frame.outlines.empty()) {
         if (tiles_of(settings, frame.lights.size()) == 1)
@@ -328,7 +354,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     if (!params) return params.error();
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
     const TileInputs switches = inputs(frame, settings);
-    if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
+    if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches),
+                                                frame_trace_kernels(switches));
         !warm)
         return warm.error();
     params->sky = shade::sky_params(frame);
@@ -346,6 +373,10 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
         stats.passes.emplace_back("bake", field->bake_ms());
+    }
+    if (traces(frame, settings) && boxes->build_ms() > 0) {
+        stats.frame_ms += boxes->build_ms();
+        stats.passes.emplace_back("build boxes", boxes->build_ms());
     }
     Picture picture;
     picture.width = settings.width;
@@ -394,6 +425,13 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
+    stats.march_tier = switches.rt ? "rt" : "compute";
+    stats.mesh_tier = switches.mesh_shader ? "mesh" : "vertex";
+    if (boxes) {
+        stats.boxes = boxes->boxes();
+        stats.box_tree_builds = boxes->builds();
+        stats.box_tree_bytes = boxes->bytes();
+    }
     stats.triangles = meshes->triangles();
     stats.triangles_drawn = meshes->triangles_drawn();
     if (runner->pipelines().made_late() != late)
@@ -433,7 +471,9 @@ std::vector<DeviceInfo> devices() {
                        .kind = std::string(rhi::name(d.kind)),
                        .api_version = d.api,
                        .usable = d.usable,
-                       .why_not = d.unusable_because});
+                       .why_not = d.unusable_because,
+                       .mesh_shader = d.mesh_shader,
+                       .rt_pipeline = d.rt_pipeline});
     }
     return out;
 }

@@ -35,6 +35,8 @@ public:
         case BindingKind::Sampler:
             ++rows_[3].is;
             break;
+        case BindingKind::BoxTree:  // the tier that has them has room for them
+            break;
         }
     }
     const std::array<Row, 5>& rows() const { return rows_; }

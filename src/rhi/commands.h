@@ -90,6 +90,8 @@ public:
     virtual void set_push(std::span<const std::byte> bytes) = 0;
     virtual void dispatch(uint32_t groups_x, uint32_t groups_y = 1, uint32_t groups_z = 1) = 0;
     virtual void dispatch_indirect(BufferHandle buffer, uint64_t offset) = 0;  // three uint32 group counts
+    virtual void set_pipeline(TracePipeline pipeline) = 0;                     // in the place of a compute pipeline
+    virtual void trace(uint32_t width, uint32_t height) = 0;
     virtual void end() = 0;
 
     template <typename T>
@@ -118,6 +120,8 @@ public:
     virtual void draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws = 1, uint32_t stride = 16) = 0;
     virtual void draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws = 1,
                                        uint32_t stride = 20) = 0;
+    // Workgroups of a pipeline with a mesh shader. Their triangles keep the order of the groups, x first.
+    virtual void draw_mesh_groups(uint32_t groups_x, uint32_t groups_y = 1, uint32_t groups_z = 1) = 0;
     virtual void end() = 0;
 
     template <typename T>
@@ -145,6 +149,10 @@ public:
                               uint32_t word = 0) = 0;
     // CopyWrite. Components as the format reads them: float formats take floats, uint formats the numbers rounded.
     virtual void clear_texture(TextureHandle texture, std::array<float, 4> value = {}, Subresources range = {}) = 0;
+
+    // Makes `tree` one of `count` (at least 1) boxes from `offset` (a multiple of 8) of `boxes`: a shader finds them by
+    // gl_PrimitiveID. What the tree was before is gone. BoxesRead of boxes, BoxTreeWrite of tree.
+    virtual void build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) = 0;
 
     virtual void barrier(BarrierKey, std::span<const Barrier> barriers) = 0;
 

@@ -47,6 +47,7 @@ public:
     virtual Result<PipelineLayout> create_pipeline_layout(const PipelineLayoutDesc& desc) = 0;
     virtual Result<ComputePipeline> create_compute_pipeline(const ComputePipelineDesc& desc) = 0;
     virtual Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) = 0;
+    virtual Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) = 0;
     virtual Result<QuerySet> create_query_set(const QuerySetDesc& desc) = 0;
 
     virtual void destroy(HeapHandle handle) = 0;
@@ -60,6 +61,7 @@ public:
     virtual void destroy(PipelineLayout handle) = 0;
     virtual void destroy(ComputePipeline handle) = 0;
     virtual void destroy(RenderPipeline handle) = 0;
+    virtual void destroy(TracePipeline handle) = 0;
     virtual void destroy(QuerySet handle) = 0;
 
     // ---- what an object is
@@ -68,6 +70,8 @@ public:
     // Room a resource needs in a heap. `desc.heap` is ignored.
     virtual MemoryNeed memory_need(const BufferDesc& desc) = 0;
     virtual MemoryNeed memory_need(const TextureDesc& desc) = 0;
+    // Of a buffer of usage BoxTree that is to hold `boxes` of them.
+    virtual uint64_t box_tree_bytes(uint32_t boxes) = 0;
     // Null for a stale handle. Lives as long as the module or pipeline.
     virtual const Reflection* reflection(ShaderModule shader) = 0;
     virtual const Reflection* reflection(ComputePipeline pipeline) = 0;
@@ -75,6 +79,7 @@ public:
     // reflected entries are equal share it. The pipeline owns it: don't destroy it.
     virtual BindGroupLayout group_layout(ComputePipeline pipeline, uint32_t index) = 0;
     virtual BindGroupLayout group_layout(RenderPipeline pipeline, uint32_t index) = 0;
+    virtual BindGroupLayout group_layout(TracePipeline pipeline, uint32_t index) = 0;
     // The sizes and usages it was made with (label and heap excepted). A default-constructed one for a stale handle.
     virtual BufferDesc desc(BufferHandle buffer) = 0;
     virtual TextureDesc desc(TextureHandle texture) = 0;

@@ -35,6 +35,7 @@ enum Op : uint32_t {
     OpDecorate = 71,
     OpMemberDecorate = 72,
     OpExecutionModeId = 331,
+    OpTypeAccelerationStructure = 5341,
 };
 
 enum Decoration : uint32_t {
@@ -241,7 +242,7 @@ Result<Reflection> Reader::read(std::span<const uint32_t> words) {
         instruction(words[at] & 0xffffu, words.subspan(at + 1, length - 1));
         at += length;
     }
-    if (entry_id_ == 0) return Error{"shader: SPIR-V has no vertex, fragment or compute entry point", ErrorKind::Input};
+    if (entry_id_ == 0) return Error{"shader: SPIR-V has no entry point of a stage that we know", ErrorKind::Input};
     finish();
     return std::move(out_);
 }
@@ -262,6 +263,11 @@ void Reader::instruction(uint32_t op, std::span<const uint32_t> args) {
             if (model == 0) out_.stage = ShaderStage::Vertex;
             if (model == 4) out_.stage = ShaderStage::Fragment;
             if (model == 5) out_.stage = ShaderStage::Compute;
+            if (model == 5313) out_.stage = ShaderStage::RayGen;
+            if (model == 5314) out_.stage = ShaderStage::Intersection;
+            if (model == 5316) out_.stage = ShaderStage::ClosestHit;
+            if (model == 5317) out_.stage = ShaderStage::Miss;
+            if (model == 5365) out_.stage = ShaderStage::Mesh;
             if (out_.stage == ShaderStage::None) break;
             entry_id_ = args[1];
             out_.entry = text(args.subspan(2));
@@ -283,6 +289,7 @@ void Reader::instruction(uint32_t op, std::span<const uint32_t> args) {
         break;
     case OpTypeBool:
     case OpTypeSampler:
+    case OpTypeAccelerationStructure:
         if (at_least(1)) types_[args[0]] = {.op = op, .width = 32};
         break;
     case OpTypeInt:
@@ -574,6 +581,8 @@ void Reader::finish_binding(const Variable& variable, const Type& pointer, const
                                               : SampleType::Float;
     } else if (inner.op == OpTypeSampler) {
         b.kind = BindingKind::Sampler;
+    } else if (inner.op == OpTypeAccelerationStructure) {
+        b.kind = BindingKind::BoxTree;
     } else if (inner.op == OpTypeSampledImage) {
         b.kind = BindingKind::SampledTexture;
         out_.beyond_floor.push_back("CombinedTextureSampler");

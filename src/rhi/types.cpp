@@ -38,6 +38,9 @@ constexpr std::string_view kAccessNames[] = {
     "CopyWrite",
     "HostRead",
     "Present",
+    "BoxesRead",
+    "BoxTreeWrite",
+    "BoxTreeRead",
 };
 
 }  // namespace
@@ -71,6 +74,32 @@ std::string_view name(BindingKind kind) {
         return "StorageTexture";
     case BindingKind::StorageTextureReadOnly:
         return "StorageTextureReadOnly";
+    case BindingKind::BoxTree:
+        return "BoxTree";
+    }
+    return "?";
+}
+
+std::string_view name(ShaderStage stage) {
+    switch (stage) {
+    case ShaderStage::None:
+        return "none";
+    case ShaderStage::Vertex:
+        return "vertex";
+    case ShaderStage::Fragment:
+        return "fragment";
+    case ShaderStage::Compute:
+        return "compute";
+    case ShaderStage::Mesh:
+        return "mesh";
+    case ShaderStage::RayGen:
+        return "ray generation";
+    case ShaderStage::Miss:
+        return "miss";
+    case ShaderStage::Intersection:
+        return "intersection";
+    case ShaderStage::ClosestHit:
+        return "closest hit";
     }
     return "?";
 }

@@ -38,6 +38,7 @@ using BindGroup = Handle<struct BindGroupTag>;
 using PipelineLayout = Handle<struct PipelineLayoutTag>;
 using ComputePipeline = Handle<struct ComputePipelineTag>;
 using RenderPipeline = Handle<struct RenderPipelineTag>;
+using TracePipeline = Handle<struct TracePipelineTag>;
 using QuerySet = Handle<struct QuerySetTag>;
 
 // Number of a submission to the queue; later ones are larger. 0 is "none", always completed.
@@ -53,7 +54,8 @@ using SubmitId = uint64_t;
 
 // How commands touch a buffer or a range of texture subresources. Synchronisation and texture layouts follow from it.
 // Several reads may stand together (`SampledReadCompute | CopyRead`); a write stands alone. StorageWrite includes
-// reading in the same shader, DepthWrite the depth test, ColorWrite blending.
+// reading in the same shader, DepthWrite the depth test, ColorWrite blending. What ray-tracing shaders touch is …Compute,
+// what mesh shaders touch …Graphics.
 enum class Access : uint32_t {
     Undefined = 0,  // before: the contents don't matter. After: not allowed
     IndirectRead = 1u << 0,
@@ -73,16 +75,32 @@ enum class Access : uint32_t {
     CopyWrite = 1u << 14,
     HostRead = 1u << 15,
     Present = 1u << 16,
+    BoxesRead = 1u << 17,     // by build_box_tree
+    BoxTreeWrite = 1u << 18,  // by build_box_tree
+    BoxTreeRead = 1u << 19,   // by rays
 };
 KILN_RHI_BITS(Access)
 constexpr Access kWriteAccess = Access::StorageWriteGraphics | Access::StorageWriteCompute | Access::ColorWrite |
-                                Access::DepthWrite | Access::CopyWrite;
+                                Access::DepthWrite | Access::CopyWrite | Access::BoxTreeWrite;
 constexpr bool writes(Access a) { return any(a & kWriteAccess); }
 std::string name(Access access);  // "SampledReadCompute|CopyRead"
 
-enum class ShaderStage : uint32_t { None = 0, Vertex = 1, Fragment = 2, Compute = 4 };
+enum class ShaderStage : uint32_t {
+    None = 0,
+    Vertex = 1,
+    Fragment = 2,
+    Compute = 4,
+    Mesh = 8,     // needs Caps::mesh_shader
+    RayGen = 16,  // these four need Caps::rt_pipeline
+    Miss = 32,
+    Intersection = 64,
+    ClosestHit = 128,
+};
 KILN_RHI_BITS(ShaderStage)
-constexpr ShaderStage kAllStages = ShaderStage::Vertex | ShaderStage::Fragment | ShaderStage::Compute;
+inline constexpr std::array kStages{ShaderStage::Vertex,       ShaderStage::Fragment,  ShaderStage::Compute,
+                                    ShaderStage::Mesh,         ShaderStage::RayGen,    ShaderStage::Miss,
+                                    ShaderStage::Intersection, ShaderStage::ClosestHit};
+std::string_view name(ShaderStage stage);  // of one stage: "ray generation"
 
 // ---- memory ----------------------------------------------------------------------------------------------------
 
@@ -102,7 +120,9 @@ enum class BufferUsage : uint32_t {
     Vertex = 32,
     Indirect = 64,
     QueryResolve = 128,
-    Address = 256,  // its GPU address can be asked for; needs Caps::buffer_address
+    Address = 256,   // its GPU address can be asked for; needs Caps::buffer_address
+    Boxes = 512,     // Box after Box, for build_box_tree; needs Caps::rt_pipeline
+    BoxTree = 1024,  // holds a box tree and nothing else (Device::box_tree_bytes); needs Caps::rt_pipeline
 };
 KILN_RHI_BITS(BufferUsage)
 
@@ -200,6 +220,7 @@ enum class BindingKind : uint8_t {
     Sampler,
     StorageTexture,          // `image3D` with an explicit format; written (and read, if the shader does)
     StorageTextureReadOnly,  // `readonly image3D`
+    BoxTree,                 // `accelerationStructureEXT`: a buffer of usage BoxTree
 };
 std::string_view name(BindingKind kind);
 
@@ -328,6 +349,26 @@ struct RenderPipelineDesc {
     DepthState depth = {};
     std::span<const SpecConstant> constants = {};
     std::string_view label = {};
+    // Instead of `vertex` and `vertex_buffers`: workgroups that make triangles (draw_mesh_groups). Its entry is "main".
+    // Needs Caps::mesh_shader.
+    ShaderModule mesh = {};
+};
+
+// One box of a box tree, in the space of the rays that are traced through it.
+struct Box {
+    float min_x, min_y, min_z;
+    float max_x, max_y, max_z;
+};
+
+// Rays through box trees: `raygen` runs for each of width x height and traces; `intersection` says of a box that a ray may meet
+// whether, and where, the ray hits what is in it; `closest_hit` or `miss` ends the ray.
+struct TracePipelineDesc {
+    ShaderModule raygen = {};
+    ShaderModule miss = {};
+    ShaderModule intersection = {};
+    ShaderModule closest_hit = {};
+    PipelineLayout layout = {};  // none: made from the reflected bindings of all shaders
+    std::string_view label = {};
 };
 
 struct QuerySetDesc {
@@ -350,14 +391,16 @@ constexpr uint32_t kMaxPushBytes = 64;
 constexpr uint32_t kMaxWorkgroupThreads = 256;
 constexpr uint32_t kMaxWorkgroupShared = 16 << 10;
 constexpr uint32_t kMaxGroupsPerDispatch = 65535;  // along each axis
+constexpr uint32_t kMaxMeshGroups = 1u << 22;      // of one draw_mesh_groups
+constexpr uint32_t kMaxRays = 1u << 30;            // of one trace
 constexpr uint32_t kMaxTexture2d = 8192;
 constexpr uint32_t kMaxTexture3d = 2048;
 constexpr uint32_t kMaxTextureLayers = 256;
 constexpr uint32_t kMaxColorTargets = 8;
 constexpr uint32_t kBindingAlignment = 256;  // of a buffer binding's offset
 
-// Tiers above the floor. Every one has a fallback. No backend grants bindless, buffer_address, min_max_sampler,
-// mesh_shader, rt_pipeline or async_compute yet.
+// Tiers above the floor. Every one has a fallback. No backend grants bindless, buffer_address, min_max_sampler or
+// async_compute yet.
 struct Caps {
     bool timestamp = false;
     bool storage_r16f = false;  // storage textures of R16Float, R16Uint, Rg16Float, R8Snorm, R11g11b10Float
@@ -366,8 +409,8 @@ struct Caps {
     bool int64_buffer_atomics = false;
     bool min_max_sampler = false;
     bool float32_filter = false;  // linear sampling of R32Float, Rgba32Float
-    bool mesh_shader = false;
-    bool rt_pipeline = false;
+    bool mesh_shader = false;     // in render pipelines
+    bool rt_pipeline = false;     // ray-tracing pipelines over boxes
     bool async_compute = false;
     bool multi_draw_indirect = false;
 };
@@ -395,6 +438,7 @@ struct DeviceInfo {
     uint64_t memory_bytes = 0;  // of device-local heaps
     bool usable = true;
     std::string unusable_because = {};
+    bool mesh_shader = false, rt_pipeline = false;  // as in Caps
 };
 
 struct MemoryStats {

@@ -433,6 +433,26 @@ TEST_F(CliGpu, RenderWritesThePictureAndItsCost) {
     EXPECT_FALSE(fs::exists(folder_ / "b.png"));
 }
 
+// Every device has the compute tier; one that doctor does not list for it is refused, and no file is left.
+TEST_F(CliGpu, ATierIsDrawnByOrRefusedInOneLine) {
+    write("ball.kiln.json", kBall);
+    const Outcome compute = run("render ball.kiln.json -o a.png --size 32x24 --tier compute --json");
+    ASSERT_EQ(compute.code, 0) << compute.err;
+    EXPECT_THAT(compute.out, HasSubstr("\"march_tier\": \"compute\""));
+    const std::string doctor = run("doctor --json").out;
+    EXPECT_THAT(doctor, HasSubstr("\"tiers\": [\"compute\""));
+    if (doctor.find("\"rt\"") == std::string::npos) {
+        const Outcome rt = run("render ball.kiln.json -o b.png --size 32x24 --tier rt");
+        EXPECT_EQ(rt.code, 4);
+        EXPECT_THAT(rt.err, HasSubstr("has no ray-tracing pipelines; the compute tier draws the same picture"));
+        expect_one_line(rt, "tier rt");
+        EXPECT_THAT(files(), testing::ElementsAre("a.png", "ball.kiln.json"));
+    }
+    const Outcome typo = run("render ball.kiln.json -o b.png --tier mseh");
+    EXPECT_EQ(typo.code, 2);
+    EXPECT_THAT(typo.err, HasSubstr("--tier mseh: there is no such tier; did you mean mesh?"));
+}
+
 TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
     write("later.kiln.json",
           "{\"format\": 1, \"cloths\": [{\"id\": \"flag\", \"size\": [1, 1]}], \"edits\": [{\"shape\": \"sphere\"}]}");

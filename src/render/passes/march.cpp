@@ -19,6 +19,8 @@ Visibility march(Graph& g, const TileInputs& in) {
     Image words = g.create("visibility", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     if (in.analytic) {
         g.clear(words);
+    } else if (in.rt) {
+        out.evaluations.push_back(march_boxes(g, in, words));
     } else {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
         std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays), g.read(f.distances),

@@ -79,7 +79,8 @@ KILN_CONST float kMeshNear = 1e-4f;
 
 struct MeshDrawPush {
     uint first;  // of the cluster list
-    uint pad_0, pad_1, pad_2;
+    uint count;
+    uint pad_1, pad_2;
 };
 
 #ifdef __cplusplus

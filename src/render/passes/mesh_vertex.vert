@@ -1,7 +1,6 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// Triangles of meshes, an instance a cluster of them; vertices are pulled. Clip space is that of the tile: what a pixel's middle shows is on
-// the ray that pixel_ray() gives it.
+// Triangles of meshes, an instance a cluster of them; vertices are pulled.
 #extension GL_GOOGLE_include_directive : require
 #include "render/passes/frame.gpu.h"
 #include "render/passes/mesh.gpu.h"
@@ -14,6 +13,7 @@ layout(set = 0, binding = 4, std430) readonly buffer Vertices { MeshVertex mesh_
 layout(push_constant) uniform Push { MeshDrawPush push; };
 
 #include "render/passes/mesh.glsl"
+#include "render/passes/mesh_clip.glsl"
 
 layout(location = 0) flat out uvec2 id;  // triangle of the part, part
 layout(location = 1) out vec4 uv;        // both sets
@@ -35,12 +35,5 @@ void main() {
         uv = vec4(vertex_uv(v, false), vertex_uv(v, true));
         alpha = vertex_color(v).a;
     }
-    vec3 p = mesh_point(part, vertex_position(v));
-    float w = dot(p, frame.camera.forward.xyz);
-    // In the picture, -w to w; then in the tile.
-    float x = dot(p, frame.camera.right.xyz) / dot(frame.camera.right.xyz, frame.camera.right.xyz);
-    float y = dot(p, frame.camera.up.xyz) / dot(frame.camera.up.xyz, frame.camera.up.xyz);
-    vec2 wider = vec2(frame.width, frame.height) / vec2(frame.tile_width, frame.tile_height);
-    vec2 moved = 2.0 * vec2(frame.tile_x, frame.tile_y) / vec2(frame.tile_width, frame.tile_height);
-    gl_Position = vec4((x + w) * wider.x - (moved.x + 1.0) * w, (y - w) * wider.y + (moved.y + 1.0) * w, kMeshNear, w);
+    gl_Position = mesh_clip(mesh_point(part, vertex_position(v)));
 }

@@ -3,6 +3,7 @@
 // is there, mesh_shadow what meshes hide of the lights.
 #include "render/passes/passes.h"
 
+#include "shaders/mesh_groups_mesh.spv.h"
 #include "shaders/mesh_id_frag.spv.h"
 #include "shaders/mesh_id_mask_frag.spv.h"
 #include "shaders/mesh_resolve.spv.h"
@@ -10,12 +11,15 @@
 #include "shaders/mesh_shadow.spv.h"
 #include "shaders/mesh_vertex_vert.spv.h"
 
+#include <algorithm>
+
 namespace kiln::render {
 
 namespace {
 
 constexpr rhi::ColorTarget kIds[] = {{.format = rhi::Format::Rg32Uint}};
 constexpr rhi::DepthState kDepth{.format = rhi::Format::Depth32Float};
+constexpr uint32_t kGroupsInRow = 32768;  // of a mesh shader: fewer than a device takes along an axis
 constexpr rhi::SamplerDesc kTrilinear{.mip = rhi::Filter::Linear, .address = rhi::AddressMode::Repeat};
 
 }  // namespace
@@ -40,14 +44,38 @@ const RasterKernel kMeshMasked{.name = "meshes with holes",
                                .colors = kIds,
                                .depth = kDepth};
 
+const RasterKernel kMeshOneSidedGroups{.name = "meshes by groups",
+                                       .vertex = {},
+                                       .fragment = kMeshIdFragSpv,
+                                       .colors = kIds,
+                                       .depth = kDepth,
+                                       .cull = rhi::Cull::Back,
+                                       .mesh = kMeshGroupsMeshSpv};
+const RasterKernel kMeshDoubleSidedGroups{.name = "meshes by groups, both sides",
+                                          .vertex = {},
+                                          .fragment = kMeshIdFragSpv,
+                                          .colors = kIds,
+                                          .depth = kDepth,
+                                          .mesh = kMeshGroupsMeshSpv};
+const RasterKernel kMeshMaskedGroups{.name = "meshes by groups with holes",
+                                     .vertex = {},
+                                     .fragment = kMeshIdMaskFragSpv,
+                                     .colors = kIds,
+                                     .depth = kDepth,
+                                     .mesh = kMeshGroupsMeshSpv};
+
 Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
     const MeshHandles& m = in.meshes;
     Image ids = g.create("mesh ids", {.size = in.size, .format = rhi::Format::Rg32Uint});
     Image depth = g.create("mesh depth", {.size = in.size, .format = rhi::Format::Depth32Float});
     rhi::Load load = rhi::Load::Clear;
-    const auto draw = [&](const RasterKernel& kernel, uint32_t first, uint32_t count, bool holes) {
+    const auto draw = [&](const RasterKernel& by_vertices, const RasterKernel& by_groups, uint32_t first,
+                          uint32_t count, bool holes) {
         if (count == 0) return;
-        const DrawCall call{.vertices = 3 * kMeshCluster, .instances = count};
+        const RasterKernel& kernel = in.mesh_shader ? by_groups : by_vertices;
+        const DrawCall call = in.mesh_shader ? DrawCall{.vertices = std::min(count, kGroupsInRow),
+                                                        .instances = (count + kGroupsInRow - 1) / kGroupsInRow}
+                                             : DrawCall{.vertices = 3 * kMeshCluster, .instances = count};
         std::vector<Use> uses{g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners),
                               g.read(m.vertices)};
         if (holes) {
@@ -56,12 +84,12 @@ Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const 
             uses.push_back(g.sampler(kTrilinear));
         }
         g.draw(kernel, {.colors = {{.image = &ids, .load = load}}, .depth = {.image = &depth, .load = load}}, uses,
-               MeshDrawPush{.first = first, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0}, {&call, 1});
+               MeshDrawPush{.first = first, .count = count, .pad_1 = 0, .pad_2 = 0}, {&call, 1});
         load = rhi::Load::Load;
     };
-    draw(kMeshOneSided, 0, m.one_sided, false);
-    draw(kMeshDoubleSidedDraw, m.one_sided, m.double_sided, false);
-    draw(kMeshMasked, m.one_sided + m.double_sided, m.masked, true);
+    draw(kMeshOneSided, kMeshOneSidedGroups, 0, m.one_sided, false);
+    draw(kMeshDoubleSidedDraw, kMeshDoubleSidedGroups, m.one_sided, m.double_sided, false);
+    draw(kMeshMasked, kMeshMaskedGroups, m.one_sided + m.double_sided, m.masked, true);
     if (load == rhi::Load::Clear) g.clear(ids);  // nothing is in sight
     Image out = g.create("visibility with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kMeshSee, in.size,

@@ -2,6 +2,7 @@
 // The passes of a frame, each a function of images, each in the file of its name. Kernels are named here for warm-up.
 #pragma once
 
+#include "render/gpu_boxes.h"
 #include "render/gpu_field.h"
 #include "render/gpu_instances.h"
 #include "render/gpu_meshes.h"
@@ -25,6 +26,8 @@ extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResol
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
+extern const RasterKernel kMeshOneSidedGroups, kMeshDoubleSidedGroups, kMeshMaskedGroups;  // by a mesh shader
+extern const TraceKernel kMarchTrace;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
 // Bakes `slots` (at most a slice) into the field's atlas.
@@ -81,6 +84,9 @@ struct TileInputs {
     TapeUse use_of_outlines;
     MeshHandles meshes;
     bool has_meshes = false;
+    BoxHandles boxes;          // with `rt`
+    bool rt = false;           // the bricks are marched by rays through their boxes
+    bool mesh_shader = false;  // clusters of meshes are drawn by a mesh shader
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -89,6 +95,8 @@ struct Visibility {
     std::vector<Buffer> evaluations;
 };
 Visibility march(Graph& g, const TileInputs& in);
+// The words of the bricks, by rays through in.boxes; what it answers counts evaluations.
+Buffer march_boxes(Graph& g, const TileInputs& in, Image& words);
 
 struct Surface {
     Image words;  // packed G-buffer, see surface.glsl

@@ -231,6 +231,10 @@ void NullEncoder::clear_texture(TextureHandle texture, std::array<float, 4> valu
     });
 }
 
+void NullEncoder::build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) {
+    line("build " + named(tree) + " of " + number(count) + " boxes " + named(boxes) + "+" + number(offset));
+}
+
 void NullEncoder::barrier(BarrierKey, std::span<const Barrier> barriers) {
     for (const Barrier& b : barriers) {
         std::string text = "barrier ";
@@ -265,6 +269,7 @@ void NullEncoder::resolve_queries(QuerySet set, uint32_t first, uint32_t count, 
 
 void NullEncoder::set_pipeline(ComputePipeline pipeline) { line("pipeline " + named(pipeline)); }
 void NullEncoder::set_pipeline(RenderPipeline pipeline) { line("pipeline " + named(pipeline)); }
+void NullEncoder::set_pipeline(TracePipeline pipeline) { line("pipeline " + named(pipeline)); }
 void NullEncoder::set_bind_group(uint32_t index, BindGroup group, std::span<const uint32_t> dynamic_offsets) {
     std::string text = "group " + number(index) + " " + named(group);
     for (const uint32_t offset : dynamic_offsets) text += " +" + number(offset);
@@ -275,6 +280,7 @@ void NullEncoder::dispatch(uint32_t x, uint32_t y, uint32_t z) { line("dispatch 
 void NullEncoder::dispatch_indirect(BufferHandle buffer, uint64_t offset) {
     line("dispatch indirect " + named(buffer) + "+" + number(offset));
 }
+void NullEncoder::trace(uint32_t width, uint32_t height) { line("trace " + number(width) + "x" + number(height)); }
 void NullEncoder::set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset) {
     line("vertices " + number(slot) + " " + named(buffer) + "+" + number(offset));
 }
@@ -307,5 +313,6 @@ void NullEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset, ui
     line("draw indexed indirect " + named(buffer) + "+" + number(offset) + " x" + number(draws) + " stride " +
          number(stride));
 }
+void NullEncoder::draw_mesh_groups(uint32_t x, uint32_t y, uint32_t z) { line("mesh groups " + size_text({x, y, z})); }
 
 }  // namespace kiln::rhi::null

@@ -9,7 +9,8 @@ namespace kiln::rhi::null {
 
 NullDevice::NullDevice() {
     info_ = {.backend = "null", .name = "null", .driver = "none", .api = "none", .kind = DeviceKind::Other};
-    caps_ = {.timestamp = true, .storage_r16f = true, .multi_draw_indirect = true};
+    caps_ = {
+        .timestamp = true, .storage_r16f = true, .mesh_shader = true, .rt_pipeline = true, .multi_draw_indirect = true};
     limits_.max_buffer = 4ull << 30;
 }
 
@@ -34,6 +35,11 @@ BindGroupLayout NullDevice::group_layout(ComputePipeline pipeline, uint32_t inde
 }
 
 BindGroupLayout NullDevice::group_layout(RenderPipeline pipeline, uint32_t index) {
+    const Pipeline* p = find(pipeline);
+    return p && index < p->groups.size() ? p->groups[index] : BindGroupLayout{};
+}
+
+BindGroupLayout NullDevice::group_layout(TracePipeline pipeline, uint32_t index) {
     const Pipeline* p = find(pipeline);
     return p && index < p->groups.size() ? p->groups[index] : BindGroupLayout{};
 }
@@ -130,7 +136,8 @@ MemoryStats NullDevice::memory_stats() const {
 
 uint32_t NullDevice::live_handle_count() const {
     uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
-                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + queries_.size();
+                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + trace_pipelines_.size() +
+                     queries_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;
@@ -156,6 +163,7 @@ std::string NullDevice::live_handles() const {
     list(layouts_, "pipeline layout");
     list(compute_, "compute pipeline");
     list(render_, "render pipeline");
+    list(trace_pipelines_, "trace pipeline");
     list(queries_, "query set");
     return out;
 }

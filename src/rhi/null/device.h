@@ -83,6 +83,7 @@ public:
     Result<PipelineLayout> create_pipeline_layout(const PipelineLayoutDesc& desc) override;
     Result<ComputePipeline> create_compute_pipeline(const ComputePipelineDesc& desc) override;
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
+    Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
 
     void destroy(HeapHandle handle) override { forget(heaps_, handle, "heap"); }
@@ -96,15 +97,18 @@ public:
     void destroy(PipelineLayout handle) override { forget(layouts_, handle, "pipeline layout"); }
     void destroy(ComputePipeline handle) override { forget(compute_, handle, "compute pipeline"); }
     void destroy(RenderPipeline handle) override { forget(render_, handle, "render pipeline"); }
+    void destroy(TracePipeline handle) override { forget(trace_pipelines_, handle, "trace pipeline"); }
     void destroy(QuerySet handle) override { forget(queries_, handle, "query set"); }
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override;
     MemoryNeed memory_need(const TextureDesc& desc) override;
+    uint64_t box_tree_bytes(uint32_t boxes) override { return 256 + 64ull * boxes; }
     const Reflection* reflection(ShaderModule shader) override;
     const Reflection* reflection(ComputePipeline pipeline) override;
     BindGroupLayout group_layout(ComputePipeline pipeline, uint32_t index) override;
     BindGroupLayout group_layout(RenderPipeline pipeline, uint32_t index) override;
+    BindGroupLayout group_layout(TracePipeline pipeline, uint32_t index) override;
     BufferDesc desc(BufferHandle buffer) override;
     TextureDesc desc(TextureHandle texture) override;
     ViewDesc desc(ViewHandle view) override;
@@ -134,6 +138,7 @@ public:
     View* find(ViewHandle h) { return found(views_.get(h), "view"); }
     Pipeline* find(ComputePipeline h) { return found(compute_.get(h), "compute pipeline"); }
     Pipeline* find(RenderPipeline h) { return found(render_.get(h), "render pipeline"); }
+    Pipeline* find(TracePipeline h) { return found(trace_pipelines_.get(h), "trace pipeline"); }
     Named* find(BindGroup h) { return found(groups_.get(h), "bind group"); }
     Queries* find(QuerySet h) { return found(queries_.get(h), "query set"); }
     void report(std::string_view sentence) { report_(sentence); }
@@ -171,6 +176,7 @@ private:
     SlotMap<PipelineLayout, Layout> layouts_;
     SlotMap<ComputePipeline, Pipeline> compute_;
     SlotMap<RenderPipeline, Pipeline> render_;
+    SlotMap<TracePipeline, Pipeline> trace_pipelines_;
     SlotMap<QuerySet, Queries> queries_;
     AutoLayouts auto_layouts_;
     std::string trace_;

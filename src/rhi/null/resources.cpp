@@ -135,11 +135,20 @@ Result<ComputePipeline> NullDevice::create_compute_pipeline(const ComputePipelin
 }
 
 Result<RenderPipeline> NullDevice::create_render_pipeline(const RenderPipelineDesc& desc) {
-    std::vector<ShaderModule> shaders{desc.vertex};
-    if (desc.fragment) shaders.push_back(desc.fragment);
+    std::vector<ShaderModule> shaders;
+    for (const ShaderModule shader : {desc.vertex, desc.mesh, desc.fragment})
+        if (shader) shaders.push_back(shader);
+    if (shaders.empty()) return Error{"pipeline '" + std::string(desc.label) + "': no shader"};
     auto p = make_pipeline(shaders, desc.layout, desc.label);
     if (!p) return p.error();
     return render_.insert(std::move(*p));
+}
+
+Result<TracePipeline> NullDevice::create_trace_pipeline(const TracePipelineDesc& desc) {
+    auto p =
+        make_pipeline(std::array{desc.raygen, desc.miss, desc.intersection, desc.closest_hit}, desc.layout, desc.label);
+    if (!p) return p.error();
+    return trace_pipelines_.insert(std::move(*p));
 }
 
 Result<QuerySet> NullDevice::create_query_set(const QuerySetDesc& desc) {

@@ -141,6 +141,7 @@ void ValidateEncoder::end() {
     in_ = In::Nothing;
     compute_ = {};
     render_ = {};
+    trace_ = {};
     for (BoundGroup& g : groups_) g = {};
     push_bytes_ = 0;
     vertex_buffers_.clear();
@@ -151,6 +152,14 @@ void ValidateEncoder::end() {
 void ValidateEncoder::set_pipeline(ComputePipeline pipeline) {
     if (!step("set_pipeline", In::Compute) || !find(objects_.compute, pipeline)) return;
     compute_ = pipeline;
+    trace_ = {};
+    compute_below_->set_pipeline(pipeline);
+}
+
+void ValidateEncoder::set_pipeline(TracePipeline pipeline) {
+    if (!step("set_pipeline", In::Compute) || !find(objects_.traces, pipeline)) return;
+    trace_ = pipeline;
+    compute_ = {};
     compute_below_->set_pipeline(pipeline);
 }
 
@@ -233,6 +242,8 @@ bool ValidateEncoder::bind_all(const PipelineInfo& p, bool compute) {
             if (r.buffer) {
                 const BufferInfo* b = find(objects_.buffers, r.buffer);
                 if (!b) return false;
+                if (r.slot.kind == BindingKind::BoxTree && !b->built)
+                    return fault(formatted("no box tree was ever built in buffer '{}'", b->label));
                 for (const PipelineInfo::Block& block : p.blocks)
                     if (block.set == set && block.binding == r.slot.binding && r.size < block.bytes)
                         return fault(formatted("binding '{}' of pipeline '{}' is {} B, bind group '{}' gives {}",
@@ -291,6 +302,23 @@ void ValidateEncoder::dispatch_indirect(BufferHandle buffer, uint64_t offset) {
     compute_below_->dispatch_indirect(buffer, offset);
 }
 
+void ValidateEncoder::trace(uint32_t width, uint32_t height) {
+    if (!step("trace", In::Compute)) return;
+    if (!trace_) {
+        fault("no trace pipeline is set");
+        return;
+    }
+    const TraceInfo* p = find(objects_.traces, trace_);
+    if (!p) return;
+    if (uint64_t{width} * height > kMaxRays) {
+        fault(formatted("{}x{} rays, at most {}", width, height, kMaxRays));
+        return;
+    }
+    if (!bind_all(*p, true)) return;
+    scope_end();
+    compute_below_->trace(width, height);
+}
+
 void ValidateEncoder::set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset) {
     if (!step("set_vertex_buffer", In::Render)) return;
     const BufferInfo* b = find(objects_.buffers, buffer);
@@ -333,10 +361,13 @@ void ValidateEncoder::set_blend_constant(std::array<float, 4> rgba) {
     if (step("set_blend_constant", In::Render)) render_below_->set_blend_constant(rgba);
 }
 
-bool ValidateEncoder::ready_to_draw(bool indexed) {
+bool ValidateEncoder::ready_to_draw(bool indexed, bool mesh) {
     if (!render_) return fault("no pipeline is set");
     const RenderInfo* p = find(objects_.render, render_);
     if (!p) return false;
+    if (p->mesh != mesh)
+        return fault(p->mesh ? formatted("pipeline '{}' has a mesh shader: draw_mesh_groups", p->label)
+                             : formatted("pipeline '{}' has no mesh shader", p->label));
     for (uint32_t slot = 0; slot < p->vertex_buffers; ++slot)
         if (slot >= vertex_buffers_.size() || !vertex_buffers_[slot])
             return fault(formatted("vertex buffer {} is not set", slot));
@@ -367,6 +398,36 @@ void ValidateEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset
     if (draws > 1 && !device_.caps().multi_draw_indirect) return void(fault("the device draws one at a time"));
     if (indirect(buffer, offset, draws == 0 ? 0 : uint64_t{stride} * (draws - 1) + 20))
         render_below_->draw_indexed_indirect(buffer, offset, draws, stride);
+}
+
+void ValidateEncoder::draw_mesh_groups(uint32_t x, uint32_t y, uint32_t z) {
+    if (!step("draw_mesh_groups", In::Render) || !ready_to_draw(false, true)) return;
+    if (std::max({x, y, z}) > kMaxGroupsPerDispatch || uint64_t{x} * y * z > kMaxMeshGroups) {
+        fault(formatted("{}x{}x{} workgroups, the floor is {} along an axis and {} in all", x, y, z,
+                        kMaxGroupsPerDispatch, kMaxMeshGroups));
+        return;
+    }
+    render_below_->draw_mesh_groups(x, y, z);
+}
+
+void ValidateEncoder::build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) {
+    if (!step("build_box_tree", In::Nothing)) return;
+    if (!device_.caps().rt_pipeline) return void(fault("the device has no ray-tracing pipelines"));
+    BufferInfo* to = find(objects_.buffers, tree);
+    const BufferInfo* from = find(objects_.buffers, boxes);
+    if (!to || !from || !good(check_access(Access::BoxTreeWrite, *to)) || !good(check_access(Access::BoxesRead, *from)))
+        return;
+    if (count == 0) return void(fault("no boxes"));
+    if (offset % 8 != 0 || offset > from->desc.size || count * sizeof(Box) > from->desc.size - offset)
+        return void(fault(formatted("{} boxes at {}: not a multiple of 8, or past the end of buffer '{}' ({} B)", count,
+                                    offset, from->label, from->desc.size)));
+    if (const uint64_t need = device_.box_tree_bytes(count); to->desc.size < need)
+        return void(fault(
+            formatted("a tree of {} boxes takes {} B, buffer '{}' has {}", count, need, to->label, to->desc.size)));
+    note(whole(boxes, Access::BoxesRead));
+    note(whole(tree, Access::BoxTreeWrite));
+    to->built = true;
+    below_->build_box_tree(tree, boxes, offset, count);
 }
 
 // ---- copies

@@ -20,6 +20,7 @@ public:
     void copy_texture(const TexturePlace& src, const TexturePlace& dst, Extent size) override;
     void clear_buffer(BufferHandle buffer, uint64_t offset, uint64_t size, uint32_t word) override;
     void clear_texture(TextureHandle texture, std::array<float, 4> value, Subresources range) override;
+    void build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) override;
     void barrier(BarrierKey key, std::span<const Barrier> barriers) override;
     void write_timestamp(QuerySet set, uint32_t index) override;
     void resolve_queries(QuerySet set, uint32_t first, uint32_t count, BufferHandle dst, uint64_t offset) override;
@@ -36,10 +37,12 @@ private:
     // ComputePass and RenderPass
     void set_pipeline(ComputePipeline pipeline) override;
     void set_pipeline(RenderPipeline pipeline) override;
+    void set_pipeline(TracePipeline pipeline) override;
     void set_bind_group(uint32_t index, BindGroup group, std::span<const uint32_t> dynamic_offsets) override;
     void set_push(std::span<const std::byte> bytes) override;
     void dispatch(uint32_t x, uint32_t y, uint32_t z) override;
     void dispatch_indirect(BufferHandle buffer, uint64_t offset) override;
+    void trace(uint32_t width, uint32_t height) override;
     void set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset) override;
     void set_index_buffer(BufferHandle buffer, bool is_32_bit, uint64_t offset) override;
     void set_viewport(float x, float y, float width, float height, float depth_min, float depth_max) override;
@@ -50,6 +53,7 @@ private:
                       uint32_t first_instance) override;
     void draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) override;
     void draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) override;
+    void draw_mesh_groups(uint32_t x, uint32_t y, uint32_t z) override;
     void end() override;
 
     enum class In : uint8_t { Nothing, Compute, Render };
@@ -70,7 +74,7 @@ private:
     void scope_end();
     bool bind_all(const PipelineInfo& pipeline, bool compute);
     bool indirect(BufferHandle buffer, uint64_t offset, uint64_t bytes);
-    bool ready_to_draw(bool indexed);
+    bool ready_to_draw(bool indexed, bool mesh = false);
     Use whole(BufferHandle b, Access a) const { return {.buffer = b, .texture = {}, .range = {}, .access = a}; }
     Use part(const TexturePlace& place, const TextureInfo& t, Extent size, Access a) const;
 
@@ -97,6 +101,7 @@ private:
     std::vector<Use> scope_;
     ComputePipeline compute_;
     RenderPipeline render_;
+    TracePipeline trace_;
     std::array<BoundGroup, kMaxBindGroups> groups_;
     uint32_t push_bytes_ = 0;
     std::vector<Format> color_formats_;

@@ -66,6 +66,22 @@ BindGroupLayout ValidateDevice::group_layout(RenderPipeline pipeline, uint32_t i
     return remember_group_layout(below_->group_layout(pipeline, index), *p, index);
 }
 
+BindGroupLayout ValidateDevice::group_layout(TracePipeline pipeline, uint32_t index) {
+    const TraceInfo* p = objects_.traces.find(pipeline);
+    if (!p || index >= p->groups.size()) {
+        report_(p ? formatted("group_layout: pipeline '{}' has no bind group {}", p->label, index)
+                  : "group_layout: " + objects_.traces.why_not(pipeline));
+        return {};
+    }
+    return remember_group_layout(below_->group_layout(pipeline, index), *p, index);
+}
+
+uint64_t ValidateDevice::box_tree_bytes(uint32_t boxes) {
+    if (caps().rt_pipeline) return below_->box_tree_bytes(boxes);
+    report_("box_tree_bytes: the device has no ray-tracing pipelines");
+    return 0;
+}
+
 BufferDesc ValidateDevice::desc(BufferHandle buffer) {
     if (objects_.buffers.find(buffer)) return below_->desc(buffer);
     report_("desc: " + objects_.buffers.why_not(buffer));

@@ -28,6 +28,7 @@ public:
     Result<PipelineLayout> create_pipeline_layout(const PipelineLayoutDesc& desc) override;
     Result<ComputePipeline> create_compute_pipeline(const ComputePipelineDesc& desc) override;
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
+    Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
 
     void destroy(HeapHandle handle) override;
@@ -41,15 +42,18 @@ public:
     void destroy(PipelineLayout handle) override { forget(objects_.layouts, handle); }
     void destroy(ComputePipeline handle) override { forget(objects_.compute, handle); }
     void destroy(RenderPipeline handle) override { forget(objects_.render, handle); }
+    void destroy(TracePipeline handle) override { forget(objects_.traces, handle); }
     void destroy(QuerySet handle) override { forget(objects_.queries, handle); }
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override { return below_->memory_need(desc); }
     MemoryNeed memory_need(const TextureDesc& desc) override { return below_->memory_need(desc); }
+    uint64_t box_tree_bytes(uint32_t boxes) override;
     const Reflection* reflection(ShaderModule shader) override;
     const Reflection* reflection(ComputePipeline pipeline) override;
     BindGroupLayout group_layout(ComputePipeline pipeline, uint32_t index) override;
     BindGroupLayout group_layout(RenderPipeline pipeline, uint32_t index) override;
+    BindGroupLayout group_layout(TracePipeline pipeline, uint32_t index) override;
     BufferDesc desc(BufferHandle buffer) override;
     TextureDesc desc(TextureHandle texture) override;
     ViewDesc desc(ViewHandle view) override;
@@ -89,6 +93,7 @@ private:
     // A sentence about the heap placement, or nothing.
     std::string check_placement(HeapHandle heap, uint64_t offset, const MemoryNeed& need);
     std::string check_entry(const BindGroupLayoutEntry& slot, const BindGroupEntry& entry, BoundResource& out);
+    std::string add_stage(std::vector<const Reflection*>& out, ShaderModule handle, ShaderStage stage);
     std::string fill_pipeline(PipelineInfo& out, std::span<const Reflection* const> shaders, PipelineLayout layout);
     BindGroupLayout remember_group_layout(BindGroupLayout handle, const PipelineInfo& pipeline, uint32_t index);
 

@@ -22,6 +22,7 @@ struct BufferInfo {
     MemoryNeed need;  // of placed ones
     bool mapped = false;
     SubmitId last_use = 0;
+    bool built = false;  // of usage BoxTree: there is a tree in it
 };
 
 struct TextureInfo {
@@ -103,6 +104,11 @@ struct RenderInfo : PipelineInfo {
     Format depth = Format::Undefined;
     bool depth_write = false;
     uint32_t vertex_buffers = 0;
+    bool mesh = false;
+};
+
+struct TraceInfo : PipelineInfo {
+    static constexpr std::string_view kKind = "trace pipeline";
 };
 
 struct QueryInfo {
@@ -172,6 +178,7 @@ struct Objects {
     Table<PipelineLayout, LayoutInfo> layouts;
     Table<ComputePipeline, ComputeInfo> compute;
     Table<RenderPipeline, RenderInfo> render;
+    Table<TracePipeline, TraceInfo> traces;
     Table<QuerySet, QueryInfo> queries;
 };
 

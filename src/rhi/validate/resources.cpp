@@ -31,6 +31,10 @@ std::string check(const BufferDesc& d, const Caps& caps) {
     if (d.memory != MemoryKind::Device && d.heap) return "a heap holds device memory only";
     if (any(d.usage & BufferUsage::Address) && !caps.buffer_address)
         return "usage Address needs the capability buffer_address";
+    if (any(d.usage & (BufferUsage::Boxes | BufferUsage::BoxTree)) && !caps.rt_pipeline)
+        return "usages Boxes and BoxTree need the capability rt_pipeline";
+    if (any(d.usage & BufferUsage::BoxTree) && (d.usage != BufferUsage::BoxTree || d.heap))
+        return "usage BoxTree stands alone, in memory of its own";
     return {};
 }
 
@@ -191,6 +195,14 @@ std::string ValidateDevice::check_entry(const BindGroupLayoutEntry& slot, const 
         out.size = size;
         return {};
     }
+    if (slot.kind == BindingKind::BoxTree) {
+        const BufferInfo* b = objects_.buffers.find(entry.buffer);
+        if (!b) return objects_.buffers.why_not(entry.buffer);
+        if (!any(b->desc.usage & BufferUsage::BoxTree)) return formatted("buffer '{}' lacks usage BoxTree", b->label);
+        out.buffer = entry.buffer;
+        out.size = b->desc.size;
+        return {};
+    }
     if (slot.kind == BindingKind::Sampler) {
         if (!objects_.samplers.find(entry.sampler)) return objects_.samplers.why_not(entry.sampler);
         out.sampler = entry.sampler;
@@ -295,12 +307,12 @@ std::string ValidateDevice::fill_pipeline(PipelineInfo& out, std::span<const Ref
     for (uint32_t set = 0; set < sets; ++set)
         for (const BindGroupLayoutEntry& e : wanted[set]) {
             const auto* given = set < l->groups.size() ? &l->groups[set] : nullptr;
-            const bool has =
-                given && std::any_of(given->begin(), given->end(), [&](const BindGroupLayoutEntry& g) {
-                    return g.binding == e.binding && g.kind == e.kind && g.format == e.format &&
-                           (is_buffer(g.kind) || g.kind == BindingKind::Sampler || g.dimension == e.dimension) &&
-                           !any(e.stages & ~g.stages);
-                });
+            const bool has = given && std::any_of(given->begin(), given->end(), [&](const BindGroupLayoutEntry& g) {
+                                 return g.binding == e.binding && g.kind == e.kind && g.format == e.format &&
+                                        (is_buffer(g.kind) || g.kind == BindingKind::Sampler ||
+                                         g.kind == BindingKind::BoxTree || g.dimension == e.dimension) &&
+                                        !any(e.stages & ~g.stages);
+                             });
             if (!has)
                 return formatted("layout '{}' has no fitting entry for set {} binding {} ({})", l->label, set,
                                  e.binding, name(e.kind));
@@ -325,22 +337,20 @@ Result<ComputePipeline> ValidateDevice::create_compute_pipeline(const ComputePip
 }
 
 Result<RenderPipeline> ValidateDevice::create_render_pipeline(const RenderPipelineDesc& desc) {
-    const ShaderInfo* vertex = objects_.shaders.find(desc.vertex);
-    const ShaderInfo* fragment = desc.fragment ? objects_.shaders.find(desc.fragment) : nullptr;
-    std::string fault;
-    if (!vertex) fault = objects_.shaders.why_not(desc.vertex);
-    if (fault.empty() && desc.fragment && !fragment) fault = objects_.shaders.why_not(desc.fragment);
-    if (fault.empty() && vertex->reflection.stage != ShaderStage::Vertex)
-        fault = formatted("'{}' is not a vertex shader", vertex->label);
-    if (fault.empty() && fragment && fragment->reflection.stage != ShaderStage::Fragment)
-        fault = formatted("'{}' is not a fragment shader", fragment->label);
-    if (!fault.empty()) return refuse(formatted("pipeline '{}': {}", desc.label, fault));
-
     RenderInfo made;
     made.label = desc.label;
-    std::vector<const Reflection*> shaders{&vertex->reflection};
-    if (fragment) shaders.push_back(&fragment->reflection);
-    fault = fill_pipeline(made, shaders, desc.layout);
+    made.mesh = bool(desc.mesh);
+    std::vector<const Reflection*> shaders;
+    std::string fault;
+    if (made.mesh) {
+        fault = add_stage(shaders, desc.mesh, ShaderStage::Mesh);
+        if (fault.empty() && (desc.vertex || !desc.vertex_buffers.empty()))
+            fault = "a mesh shader takes the place of the vertex shader and its buffers";
+    } else {
+        fault = add_stage(shaders, desc.vertex, ShaderStage::Vertex);
+    }
+    if (fault.empty() && desc.fragment) fault = add_stage(shaders, desc.fragment, ShaderStage::Fragment);
+    if (fault.empty()) fault = fill_pipeline(made, shaders, desc.layout);
     if (fault.empty() && desc.colors.size() > kMaxColorTargets)
         fault = formatted("{} colour targets, the floor is {}", desc.colors.size(), kMaxColorTargets);
     if (fault.empty() && desc.colors.empty() && desc.depth.format == Format::Undefined)
@@ -364,6 +374,31 @@ Result<RenderPipeline> ValidateDevice::create_render_pipeline(const RenderPipeli
     made.vertex_buffers = uint32_t(desc.vertex_buffers.size());
     Result<RenderPipeline> out = below_->create_render_pipeline(desc);
     if (out) objects_.render.set(*out, std::move(made));
+    return out;
+}
+
+std::string ValidateDevice::add_stage(std::vector<const Reflection*>& out, ShaderModule handle, ShaderStage stage) {
+    const ShaderInfo* shader = objects_.shaders.find(handle);
+    if (!shader) return objects_.shaders.why_not(handle);
+    if (shader->reflection.stage != stage) return formatted("'{}' is not a {} shader", shader->label, name(stage));
+    out.push_back(&shader->reflection);
+    return {};
+}
+
+Result<TracePipeline> ValidateDevice::create_trace_pipeline(const TracePipelineDesc& desc) {
+    TraceInfo made;
+    made.label = desc.label;
+    std::vector<const Reflection*> shaders;
+    std::string fault = caps().rt_pipeline ? "" : "the device has no ray-tracing pipelines";
+    for (const auto& [shader, stage] :
+         {std::pair(desc.raygen, ShaderStage::RayGen), std::pair(desc.miss, ShaderStage::Miss),
+          std::pair(desc.intersection, ShaderStage::Intersection),
+          std::pair(desc.closest_hit, ShaderStage::ClosestHit)})
+        if (fault.empty()) fault = add_stage(shaders, shader, stage);
+    if (fault.empty()) fault = fill_pipeline(made, shaders, desc.layout);
+    if (!fault.empty()) return refuse(formatted("pipeline '{}': {}", desc.label, fault));
+    Result<TracePipeline> out = below_->create_trace_pipeline(desc);
+    if (out) objects_.traces.set(*out, std::move(made));
     return out;
 }
 

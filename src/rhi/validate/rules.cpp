@@ -32,6 +32,9 @@ constexpr Needed kNeeded[] = {
     {Access::DepthRead, BufferUsage::None, TextureUsage::Depth},
     {Access::DepthWrite, BufferUsage::None, TextureUsage::Depth},
     {Access::CopyRead, BufferUsage::CopySrc, TextureUsage::CopySrc},
+    {Access::BoxesRead, BufferUsage::Boxes, TextureUsage::None},
+    {Access::BoxTreeWrite, BufferUsage::BoxTree, TextureUsage::None},
+    {Access::BoxTreeRead, BufferUsage::BoxTree, TextureUsage::None},
     {Access::CopyWrite, BufferUsage::CopyDst | BufferUsage::QueryResolve, TextureUsage::CopyDst},
 };
 
@@ -102,7 +105,7 @@ std::string check_rows(const TextureInfo& t, const BufferLayout& l, Extent size,
 std::string check_counts(std::span<const std::vector<BindGroupLayoutEntry>> groups) {
     if (groups.size() > kMaxBindGroups)
         return formatted("{} bind groups, the floor is {}", groups.size(), kMaxBindGroups);
-    for (const ShaderStage stage : {ShaderStage::Vertex, ShaderStage::Fragment, ShaderStage::Compute}) {
+    for (const ShaderStage stage : kStages) {
         BindingCounts counts;
         for (const auto& entries : groups)
             for (const BindGroupLayoutEntry& e : entries)
@@ -130,6 +133,8 @@ Access access_of(const BindGroupLayoutEntry& slot, bool compute) {
         return compute ? Access::StorageReadCompute : Access::StorageReadGraphics;
     case BindingKind::SampledTexture:
         return compute ? Access::SampledReadCompute : Access::SampledReadGraphics;
+    case BindingKind::BoxTree:
+        return Access::BoxTreeRead;
     case BindingKind::Sampler:
         break;
     }

@@ -136,7 +136,21 @@ void VulkanEncoder::end() {
 }
 
 void VulkanEncoder::set_pipeline(ComputePipeline handle) {
-    if (const Pipeline* p = device_.find(handle); have(p)) set_pipeline(p);
+    if (const Pipeline* p = device_.find(handle); have(p)) switch_to(VK_PIPELINE_BIND_POINT_COMPUTE, p);
+}
+
+void VulkanEncoder::set_pipeline(TracePipeline handle) {
+    if (const Pipeline* p = device_.find(handle); have(p)) {
+        switch_to(VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR, p);
+        table_ = p->groups_in_table;
+    }
+}
+
+// Groups are bound to one of the two kinds of pipeline.
+void VulkanEncoder::switch_to(VkPipelineBindPoint point, const Pipeline* p) {
+    if (bind_point_ != point) layout_ = VK_NULL_HANDLE;
+    bind_point_ = point;
+    set_pipeline(p);
 }
 
 void VulkanEncoder::set_pipeline(RenderPipeline handle) {
@@ -191,9 +205,8 @@ bool VulkanEncoder::apply() {
         g.dirty = false;
     }
     if (push_dirty_ && push_bytes_ > 0 && push_needed_ > 0) {
-        constexpr VkShaderStageFlags kAll =
-            VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT;
-        vk_.vkCmdPushConstants(cmd_, layout_, kAll, 0, std::min(push_bytes_, push_needed_), push_.data());
+        vk_.vkCmdPushConstants(cmd_, layout_, device_.stages().push, 0, std::min(push_bytes_, push_needed_),
+                               push_.data());
         push_dirty_ = false;
     }
     return true;
@@ -206,6 +219,12 @@ void VulkanEncoder::dispatch(uint32_t x, uint32_t y, uint32_t z) {
 void VulkanEncoder::dispatch_indirect(BufferHandle buffer, uint64_t offset) {
     const Buffer* b = device_.find(buffer);
     if (have(b) && apply()) vk_.vkCmdDispatchIndirect(cmd_, b->vk, offset);
+}
+
+void VulkanEncoder::trace(uint32_t width, uint32_t height) {
+    if (!apply()) return;
+    const VkStridedDeviceAddressRegionKHR none{};
+    vk_.vkCmdTraceRaysKHR(cmd_, &table_[0], &table_[1], &table_[2], &none, width, height, 1);
 }
 
 void VulkanEncoder::set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset) {
@@ -251,6 +270,17 @@ void VulkanEncoder::draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t
 void VulkanEncoder::draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) {
     const Buffer* b = device_.find(buffer);
     if (have(b) && apply()) vk_.vkCmdDrawIndexedIndirect(cmd_, b->vk, offset, draws, stride);
+}
+
+void VulkanEncoder::draw_mesh_groups(uint32_t x, uint32_t y, uint32_t z) {
+    if (apply()) vk_.vkCmdDrawMeshTasksEXT(cmd_, x, y, z);
+}
+
+void VulkanEncoder::build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) {
+    Buffer* to = device_.find(tree);
+    const Buffer* from = device_.find(boxes);
+    if (!have(to) || !have(from)) return;
+    if (Result<void> r = device_.record_box_tree(cmd_, *to, *from, offset, count); !r) fail(r.error());
 }
 
 // ---- copies
@@ -356,8 +386,8 @@ void VulkanEncoder::barrier(BarrierKey, std::span<const Barrier> barriers) {
     image_barriers_.clear();
     buffer_barriers_.clear();
     for (const Barrier& b : barriers) {
-        const Sync before = sync_of(b.before | b.alias_before);
-        const Sync after = sync_of(b.after);
+        const Sync before = sync_of(b.before | b.alias_before, device_.stages());
+        const Sync after = sync_of(b.after, device_.stages());
         if (b.texture) {
             const Texture* t = device_.find(b.texture);
             if (!have(t)) return;
@@ -397,8 +427,8 @@ void VulkanEncoder::barrier(BarrierKey, std::span<const Barrier> barriers) {
         alias_before |= b.alias_before;
         alias_after |= b.after;
     }
-    const Sync before = sync_of(alias_before);
-    const Sync after = sync_of(alias_after);
+    const Sync before = sync_of(alias_before, device_.stages());
+    const Sync after = sync_of(alias_after, device_.stages());
     const VkMemoryBarrier2 alias{.sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
                                  .srcStageMask = before.stages,
                                  .srcAccessMask = before.access,

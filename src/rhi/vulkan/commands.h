@@ -24,6 +24,7 @@ public:
     void copy_texture(const TexturePlace& src, const TexturePlace& dst, Extent size) override;
     void clear_buffer(BufferHandle buffer, uint64_t offset, uint64_t size, uint32_t word) override;
     void clear_texture(TextureHandle texture, std::array<float, 4> value, Subresources range) override;
+    void build_box_tree(BufferHandle tree, BufferHandle boxes, uint64_t offset, uint32_t count) override;
     void barrier(BarrierKey, std::span<const Barrier> barriers) override;
     void write_timestamp(QuerySet set, uint32_t index) override;
     void resolve_queries(QuerySet set, uint32_t first, uint32_t count, BufferHandle dst, uint64_t offset) override;
@@ -42,10 +43,12 @@ private:
     // ComputePass and RenderPass
     void set_pipeline(ComputePipeline pipeline) override;
     void set_pipeline(RenderPipeline pipeline) override;
+    void set_pipeline(TracePipeline pipeline) override;
     void set_bind_group(uint32_t index, BindGroup group, std::span<const uint32_t> dynamic_offsets) override;
     void set_push(std::span<const std::byte> bytes) override;
     void dispatch(uint32_t x, uint32_t y, uint32_t z) override;
     void dispatch_indirect(BufferHandle buffer, uint64_t offset) override;
+    void trace(uint32_t width, uint32_t height) override;
     void set_vertex_buffer(uint32_t slot, BufferHandle buffer, uint64_t offset) override;
     void set_index_buffer(BufferHandle buffer, bool is_32_bit, uint64_t offset) override;
     void set_viewport(float x, float y, float width, float height, float depth_min, float depth_max) override;
@@ -56,6 +59,7 @@ private:
                       uint32_t first_instance) override;
     void draw_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) override;
     void draw_indexed_indirect(BufferHandle buffer, uint64_t offset, uint32_t draws, uint32_t stride) override;
+    void draw_mesh_groups(uint32_t x, uint32_t y, uint32_t z) override;
     void end() override;
 
     struct BoundGroup {
@@ -66,6 +70,7 @@ private:
     };
 
     void set_pipeline(const Pipeline* pipeline);
+    void switch_to(VkPipelineBindPoint point, const Pipeline* pipeline);
     bool apply();  // groups and push data; false when there is nothing to run
     template <typename T>
     bool have(const T* object);
@@ -80,6 +85,7 @@ private:
 
     VkPipelineBindPoint bind_point_ = VK_PIPELINE_BIND_POINT_COMPUTE;
     VkPipelineLayout layout_ = VK_NULL_HANDLE;
+    std::array<VkStridedDeviceAddressRegionKHR, 3> table_{};  // of the trace pipeline
     uint32_t group_count_ = 0;
     uint32_t push_needed_ = 0;
     std::array<BoundGroup, kMaxBindGroups> groups_;

@@ -53,6 +53,13 @@ VkBufferUsageFlags to_vk(BufferUsage usage) {
     map(BufferUsage::Indirect, VK_BUFFER_USAGE_INDIRECT_BUFFER_BIT);
     map(BufferUsage::QueryResolve, VK_BUFFER_USAGE_TRANSFER_DST_BIT);
     map(BufferUsage::Address, VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT);
+    map(BufferUsage::Boxes, VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+                                VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR);
+    // Tree, the record that leads to it, and what building needs; see box_tree.cpp.
+    map(BufferUsage::BoxTree, VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+                                  VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_STORAGE_BIT_KHR |
+                                  VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR |
+                                  VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT);
     return out;
 }
 
@@ -75,6 +82,11 @@ VkShaderStageFlags to_vk(ShaderStage stages) {
     if (any(stages & ShaderStage::Vertex)) out |= VK_SHADER_STAGE_VERTEX_BIT;
     if (any(stages & ShaderStage::Fragment)) out |= VK_SHADER_STAGE_FRAGMENT_BIT;
     if (any(stages & ShaderStage::Compute)) out |= VK_SHADER_STAGE_COMPUTE_BIT;
+    if (any(stages & ShaderStage::Mesh)) out |= VK_SHADER_STAGE_MESH_BIT_EXT;
+    if (any(stages & ShaderStage::RayGen)) out |= VK_SHADER_STAGE_RAYGEN_BIT_KHR;
+    if (any(stages & ShaderStage::Miss)) out |= VK_SHADER_STAGE_MISS_BIT_KHR;
+    if (any(stages & ShaderStage::Intersection)) out |= VK_SHADER_STAGE_INTERSECTION_BIT_KHR;
+    if (any(stages & ShaderStage::ClosestHit)) out |= VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR;
     return out;
 }
 
@@ -186,6 +198,8 @@ VkDescriptorType to_vk(const BindGroupLayoutEntry& entry) {
     case BindingKind::StorageTexture:
     case BindingKind::StorageTextureReadOnly:
         return VK_DESCRIPTOR_TYPE_STORAGE_IMAGE;
+    case BindingKind::BoxTree:
+        return VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR;
     }
     return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
 }
@@ -194,10 +208,7 @@ VkImageAspectFlags aspect(Format format) {
     return is_depth(format) ? VK_IMAGE_ASPECT_DEPTH_BIT : VK_IMAGE_ASPECT_COLOR_BIT;
 }
 
-Sync sync_of(Access access) {
-    constexpr VkPipelineStageFlags2 kGraphics =
-        VK_PIPELINE_STAGE_2_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_2_FRAGMENT_SHADER_BIT;
-    constexpr VkPipelineStageFlags2 kCompute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+Sync sync_of(Access access, const ShaderStages& shaders) {
     constexpr VkPipelineStageFlags2 kDepth =
         VK_PIPELINE_STAGE_2_EARLY_FRAGMENT_TESTS_BIT | VK_PIPELINE_STAGE_2_LATE_FRAGMENT_TESTS_BIT;
     constexpr VkAccessFlags2 kStorageWrite = VK_ACCESS_2_SHADER_STORAGE_READ_BIT | VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT;
@@ -210,13 +221,13 @@ Sync sync_of(Access access) {
     map(Access::IndirectRead, VK_PIPELINE_STAGE_2_DRAW_INDIRECT_BIT, VK_ACCESS_2_INDIRECT_COMMAND_READ_BIT);
     map(Access::IndexRead, VK_PIPELINE_STAGE_2_INDEX_INPUT_BIT, VK_ACCESS_2_INDEX_READ_BIT);
     map(Access::VertexRead, VK_PIPELINE_STAGE_2_VERTEX_ATTRIBUTE_INPUT_BIT, VK_ACCESS_2_VERTEX_ATTRIBUTE_READ_BIT);
-    map(Access::UniformRead, kGraphics | kCompute, VK_ACCESS_2_UNIFORM_READ_BIT);
-    map(Access::SampledReadGraphics, kGraphics, VK_ACCESS_2_SHADER_SAMPLED_READ_BIT);
-    map(Access::SampledReadCompute, kCompute, VK_ACCESS_2_SHADER_SAMPLED_READ_BIT);
-    map(Access::StorageReadGraphics, kGraphics, VK_ACCESS_2_SHADER_STORAGE_READ_BIT);
-    map(Access::StorageReadCompute, kCompute, VK_ACCESS_2_SHADER_STORAGE_READ_BIT);
-    map(Access::StorageWriteGraphics, kGraphics, kStorageWrite);
-    map(Access::StorageWriteCompute, kCompute, kStorageWrite);
+    map(Access::UniformRead, shaders.graphics | shaders.compute, VK_ACCESS_2_UNIFORM_READ_BIT);
+    map(Access::SampledReadGraphics, shaders.graphics, VK_ACCESS_2_SHADER_SAMPLED_READ_BIT);
+    map(Access::SampledReadCompute, shaders.compute, VK_ACCESS_2_SHADER_SAMPLED_READ_BIT);
+    map(Access::StorageReadGraphics, shaders.graphics, VK_ACCESS_2_SHADER_STORAGE_READ_BIT);
+    map(Access::StorageReadCompute, shaders.compute, VK_ACCESS_2_SHADER_STORAGE_READ_BIT);
+    map(Access::StorageWriteGraphics, shaders.graphics, kStorageWrite);
+    map(Access::StorageWriteCompute, shaders.compute, kStorageWrite);
     map(Access::ColorWrite, VK_PIPELINE_STAGE_2_COLOR_ATTACHMENT_OUTPUT_BIT,
         VK_ACCESS_2_COLOR_ATTACHMENT_READ_BIT | VK_ACCESS_2_COLOR_ATTACHMENT_WRITE_BIT);
     map(Access::DepthRead, kDepth, VK_ACCESS_2_DEPTH_STENCIL_ATTACHMENT_READ_BIT);
@@ -225,6 +236,13 @@ Sync sync_of(Access access) {
     map(Access::CopyRead, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_READ_BIT);
     map(Access::CopyWrite, VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT, VK_ACCESS_2_TRANSFER_WRITE_BIT);
     map(Access::HostRead, VK_PIPELINE_STAGE_2_HOST_BIT, VK_ACCESS_2_HOST_READ_BIT);
+    constexpr VkPipelineStageFlags2 kBuild = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR;
+    map(Access::BoxesRead, kBuild, VK_ACCESS_2_SHADER_READ_BIT);
+    map(Access::BoxTreeWrite, kBuild | VK_PIPELINE_STAGE_2_ALL_TRANSFER_BIT,
+        VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR |
+            VK_ACCESS_2_TRANSFER_WRITE_BIT);
+    map(Access::BoxTreeRead, VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR,
+        VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR);
     map(Access::Present, VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT, VK_ACCESS_2_NONE);
     return out;
 }

@@ -27,7 +27,13 @@ struct Sync {
     VkPipelineStageFlags2 stages = VK_PIPELINE_STAGE_2_NONE;
     VkAccessFlags2 access = VK_ACCESS_2_NONE;
 };
-Sync sync_of(Access access);
+// The stages in which shaders run; those of the tiers only where the device has them.
+struct ShaderStages {
+    VkPipelineStageFlags2 graphics = VK_PIPELINE_STAGE_2_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_2_FRAGMENT_SHADER_BIT;
+    VkPipelineStageFlags2 compute = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT;
+    VkShaderStageFlags push = VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT;
+};
+Sync sync_of(Access access, const ShaderStages& shaders);
 
 // Layout of a texture while it is accessed so. A texture has one layout for all shader reads, fixed by its usage, because
 // bind groups are written long before anyone knows which reads will share a barrier.

@@ -37,6 +37,7 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     VkPhysicalDeviceVulkan12Features want12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
                                             .pNext = &want13};
     want12.timelineSemaphore = VK_TRUE;
+    want12.bufferDeviceAddress = adapter_.info.rt_pipeline;
     want12.scalarBlockLayout = has12.scalarBlockLayout;
     want12.shaderBufferInt64Atomics = has12.shaderBufferInt64Atomics;
     VkPhysicalDeviceVulkan11Features want11{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_FEATURES,
@@ -50,6 +51,32 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     want.features.fragmentStoresAndAtomics = has.features.fragmentStoresAndAtomics;
     want.features.vertexPipelineStoresAndAtomics = has.features.vertexPipelineStoresAndAtomics;
     want.features.independentBlend = has.features.independentBlend;
+    std::vector<const char*> extensions;
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR rays{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR, .rayTracingPipeline = VK_TRUE};
+    VkPhysicalDeviceAccelerationStructureFeaturesKHR trees{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR,
+        .pNext = &rays,
+        .accelerationStructure = VK_TRUE};
+    VkPhysicalDeviceMeshShaderFeaturesEXT mesh{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MESH_SHADER_FEATURES_EXT,
+                                               .meshShader = VK_TRUE};
+    caps_.rt_pipeline = adapter_.info.rt_pipeline;
+    caps_.mesh_shader = adapter_.info.mesh_shader;
+    if (caps_.rt_pipeline) {
+        extensions.insert(extensions.end(), kTraceExtensions.begin(), kTraceExtensions.end());
+        rays.pNext = want.pNext;
+        want.pNext = &trees;
+        stages_.compute |= VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR;
+        stages_.push |=
+            to_vk(ShaderStage::RayGen | ShaderStage::Miss | ShaderStage::Intersection | ShaderStage::ClosestHit);
+    }
+    if (caps_.mesh_shader) {
+        extensions.insert(extensions.end(), kMeshExtensions.begin(), kMeshExtensions.end());
+        mesh.pNext = want.pNext;
+        want.pNext = &mesh;
+        stages_.graphics |= VK_PIPELINE_STAGE_2_MESH_SHADER_BIT_EXT;
+        stages_.push |= to_vk(ShaderStage::Mesh);
+    }
     caps_.storage_r16f = has.features.shaderStorageImageExtendedFormats;
     caps_.int64_buffer_atomics = has12.shaderBufferInt64Atomics && has.features.shaderInt64;
     caps_.multi_draw_indirect = has.features.multiDrawIndirect;
@@ -62,7 +89,9 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     const VkDeviceCreateInfo info{.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO,
                                   .pNext = &want,
                                   .queueCreateInfoCount = 1,
-                                  .pQueueCreateInfos = &queue};
+                                  .pQueueCreateInfos = &queue,
+                                  .enabledExtensionCount = uint32_t(extensions.size()),
+                                  .ppEnabledExtensionNames = extensions.data()};
     if (const VkResult r = vkCreateDevice(physical, &info, nullptr, &device_); r != VK_SUCCESS) {
         Error error = failure("device '" + adapter_.info.name + "'", r);
         error.kind = ErrorKind::NoDevice;
@@ -70,7 +99,7 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
     }
     volkLoadDeviceTable(&vk_, device_);
     vk_.vkGetDeviceQueue(device_, adapter_.queue_family, 0, &queue_);
-    memory_.init(physical, device_, &vk_);
+    memory_.init(physical, device_, &vk_, caps_.rt_pipeline);
     uploads_.init(device_, &vk_, &memory_);
     find_caps();
 
@@ -120,7 +149,16 @@ void VulkanDevice::find_caps() {
     VkPhysicalDeviceVulkan13Properties p13{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES,
                                            .pNext = &p11};
     VkPhysicalDeviceProperties2 properties{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, .pNext = &p13};
+    VkPhysicalDeviceAccelerationStructurePropertiesKHR trees{
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR};
+    trace_limits_ = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR, .pNext = &trees};
+    if (caps_.rt_pipeline) p11.pNext = &trace_limits_;
     vkGetPhysicalDeviceProperties2(physical, &properties);
+    if (caps_.rt_pipeline) {
+        trace_limits_.pNext = nullptr;
+        scratch_alignment_ = std::max<uint64_t>(1, trees.minAccelerationStructureScratchOffsetAlignment);
+        top_bytes_ = tree_bytes(0);
+    }
     limits_.timestamp_period_ns = double(l.timestampPeriod);
     limits_.max_storage_binding = l.maxStorageBufferRange;
     limits_.max_buffer =
@@ -145,6 +183,7 @@ VulkanDevice::~VulkanDevice() {
         sweep(groups_);
         sweep(compute_);
         sweep(render_);
+        sweep(traces_);
         sweep(layouts_);
         group_layouts_.for_each(
             [&](BindGroupLayout, GroupLayout& l) { vk_.vkDestroyDescriptorSetLayout(device_, l.vk, nullptr); });
@@ -316,8 +355,8 @@ Result<void> VulkanDevice::write_texture(const TextureWrite& write, std::span<co
     Uploads::ImageTarget target{.image = t->vk, .region = image_region(t->desc, write.place, write.size)};
     target.region.bufferRowLength = write.bytes_per_row / bytes_per_texel(t->desc.format);
     target.region.bufferImageHeight = write.rows_per_layer;
-    target.before = sync_of(write.before);
-    target.after = sync_of(write.after);
+    target.before = sync_of(write.before, stages_);
+    target.after = sync_of(write.after, stages_);
     target.layout_before = layout_of(write.before, t->desc);
     target.layout_after = layout_of(write.after, t->desc);
     return uploads_.to_image(target, bytes.first(rows.total_bytes));
@@ -348,7 +387,8 @@ MemoryStats VulkanDevice::memory_stats() const {
 
 uint32_t VulkanDevice::live_handle_count() const {
     uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
-                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + queries_.size();
+                     groups_.size() + layouts_.size() + compute_.size() + render_.size() + traces_.size() +
+                     queries_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;
@@ -374,6 +414,7 @@ std::string VulkanDevice::live_handles() const {
     list(layouts_, "pipeline layout");
     list(compute_, "compute pipeline");
     list(render_, "render pipeline");
+    list(traces_, "trace pipeline");
     list(queries_, "query set");
     return out;
 }

@@ -24,6 +24,8 @@ struct Buffer {
     BufferDesc desc;
     VkBuffer vk;
     Allocation memory;  // empty when it lives in a heap
+    // Of usage BoxTree: what descriptors name, and the boxes behind it.
+    VkAccelerationStructureKHR top = VK_NULL_HANDLE, bottom = VK_NULL_HANDLE;
 };
 
 struct Texture {
@@ -79,6 +81,10 @@ struct Pipeline {
     VkPipeline vk;
     VkPipelineLayout layout;
     bool owns_layout;
+    // Of a trace pipeline: a record a shader group.
+    VkBuffer table = VK_NULL_HANDLE;
+    Allocation table_memory = {};
+    std::array<VkStridedDeviceAddressRegionKHR, 3> groups_in_table = {};  // ray generation, miss, hit
 };
 
 struct Queries {
@@ -114,6 +120,7 @@ public:
     Result<PipelineLayout> create_pipeline_layout(const PipelineLayoutDesc& desc) override;
     Result<ComputePipeline> create_compute_pipeline(const ComputePipelineDesc& desc) override;
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
+    Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
 
     void destroy(HeapHandle handle) override;
@@ -127,15 +134,18 @@ public:
     void destroy(PipelineLayout handle) override;
     void destroy(ComputePipeline handle) override;
     void destroy(RenderPipeline handle) override;
+    void destroy(TracePipeline handle) override;
     void destroy(QuerySet handle) override;
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override;
     MemoryNeed memory_need(const TextureDesc& desc) override;
+    uint64_t box_tree_bytes(uint32_t boxes) override;
     const Reflection* reflection(ShaderModule shader) override;
     const Reflection* reflection(ComputePipeline pipeline) override;
     BindGroupLayout group_layout(ComputePipeline pipeline, uint32_t index) override;
     BindGroupLayout group_layout(RenderPipeline pipeline, uint32_t index) override;
+    BindGroupLayout group_layout(TracePipeline pipeline, uint32_t index) override;
     BufferDesc desc(BufferHandle buffer) override;
     TextureDesc desc(TextureHandle texture) override;
     ViewDesc desc(ViewHandle view) override;
@@ -161,12 +171,16 @@ public:
     // For the encoder.
     const VolkDeviceTable& vk() const { return vk_; }
     const Instance& instance() const { return *instance_; }
+    const ShaderStages& stages() const { return stages_; }
+    Result<void> record_box_tree(VkCommandBuffer cmd, Buffer& tree, const Buffer& boxes, uint64_t offset,
+                                 uint32_t count);
     bool draws() const { return adapter_.graphics; }
     Buffer* find(BufferHandle h) { return found(buffers_.get(h), "buffer"); }
     Texture* find(TextureHandle h) { return found(textures_.get(h), "texture"); }
     View* find(ViewHandle h) { return found(views_.get(h), "view"); }
     Pipeline* find(ComputePipeline h) { return found(compute_.get(h), "compute pipeline"); }
     Pipeline* find(RenderPipeline h) { return found(render_.get(h), "render pipeline"); }
+    Pipeline* find(TracePipeline h) { return found(traces_.get(h), "trace pipeline"); }
     Group* find(BindGroup h) { return found(groups_.get(h), "bind group"); }
     Queries* find(QuerySet h) { return found(queries_.get(h), "query set"); }
     void report(std::string_view sentence) { report_(sentence); }
@@ -219,6 +233,13 @@ private:
     Result<CommandSlot> take_slot();
     Result<VkDescriptorSet> allocate_set(VkDescriptorSetLayout layout, VkDescriptorPool& pool);
     Result<VkBuffer> make_buffer(const BufferDesc& desc);
+    struct TreeBytes {
+        uint64_t tree = 0, scratch = 0;
+    };
+    TreeBytes tree_bytes(uint32_t boxes) const;  // 0 boxes: of the tree of one tree
+    VkDeviceAddress address(VkBuffer buffer) const;
+    Result<VkAccelerationStructureKHR> make_tree(VkBuffer buffer, uint64_t offset, uint64_t bytes, bool top);
+    Result<void> fill_table(Pipeline& pipeline);
     VkImageCreateInfo image_info(const TextureDesc& desc) const;
     Result<VkImageView> make_view(const Texture& texture, const ViewDesc& desc);
     Result<BindGroupLayout> make_group_layout(const BindGroupLayoutDesc& desc, bool owned);
@@ -241,6 +262,10 @@ private:
     SubmitId finished_ = 0;  // last seen
     bool lost_ = false;
     uint64_t pipelines_created_ = 0;
+    ShaderStages stages_;
+    TreeBytes top_bytes_;             // of the one entry that leads to a tree of boxes
+    uint64_t scratch_alignment_ = 1;  // of box trees
+    VkPhysicalDeviceRayTracingPipelinePropertiesKHR trace_limits_{};
 
     Memory memory_;
     Uploads uploads_;
@@ -262,6 +287,7 @@ private:
     SlotMap<PipelineLayout, Layout> layouts_;
     SlotMap<ComputePipeline, Pipeline> compute_;
     SlotMap<RenderPipeline, Pipeline> render_;
+    SlotMap<TracePipeline, Pipeline> traces_;
     SlotMap<QuerySet, Queries> queries_;
 };
 

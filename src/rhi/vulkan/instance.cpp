@@ -86,6 +86,37 @@ std::string missing(VkPhysicalDevice device, const VkPhysicalDeviceProperties& p
     return {};
 }
 
+// What the tiers need, beside the queue.
+void find_tiers(VkPhysicalDevice device, DeviceInfo& info) {
+    uint32_t count = 0;
+    vkEnumerateDeviceExtensionProperties(device, nullptr, &count, nullptr);
+    std::vector<VkExtensionProperties> extensions(count);
+    vkEnumerateDeviceExtensionProperties(device, nullptr, &count, extensions.data());
+    const auto all = [&](std::span<const char* const> wanted) {
+        return std::all_of(wanted.begin(), wanted.end(), [&](const char* one) {
+            return std::any_of(extensions.begin(), extensions.end(),
+                               [&](const auto& e) { return !std::strcmp(e.extensionName, one); });
+        });
+    };
+    if (all(kMeshExtensions)) {
+        VkPhysicalDeviceMeshShaderFeaturesEXT mesh{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MESH_SHADER_FEATURES_EXT};
+        VkPhysicalDeviceFeatures2 features{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, .pNext = &mesh};
+        vkGetPhysicalDeviceFeatures2(device, &features);
+        info.mesh_shader = mesh.meshShader;
+    }
+    if (all(kTraceExtensions)) {
+        VkPhysicalDeviceRayTracingPipelineFeaturesKHR rays{
+            .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR};
+        VkPhysicalDeviceAccelerationStructureFeaturesKHR trees{
+            .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR, .pNext = &rays};
+        VkPhysicalDeviceVulkan12Features v12{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_2_FEATURES,
+                                             .pNext = &trees};
+        VkPhysicalDeviceFeatures2 features{.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_FEATURES_2, .pNext = &v12};
+        vkGetPhysicalDeviceFeatures2(device, &features);
+        info.rt_pipeline = rays.rayTracingPipeline && trees.accelerationStructure && v12.bufferDeviceAddress;
+    }
+}
+
 Adapter describe(VkPhysicalDevice device) {
     Adapter out{.physical = device, .info = {}};
     vkGetPhysicalDeviceProperties(device, &out.properties);
@@ -120,6 +151,8 @@ Adapter describe(VkPhysicalDevice device) {
     }
     out.info.unusable_because = found ? missing(device, out.properties) : "no queue that computes";
     out.info.usable = out.info.unusable_because.empty();
+    if (out.info.usable) find_tiers(device, out.info);
+    out.info.mesh_shader = out.info.mesh_shader && out.graphics;
     return out;
 }
 

@@ -8,6 +8,12 @@
 
 namespace kiln::rhi::vulkan {
 
+// Device extensions of the tiers above the floor.
+inline constexpr std::array kMeshExtensions{VK_EXT_MESH_SHADER_EXTENSION_NAME};
+inline constexpr std::array kTraceExtensions{VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+                                             VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
+                                             VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME};
+
 struct Adapter {
     VkPhysicalDevice physical = VK_NULL_HANDLE;
     VkPhysicalDeviceProperties properties{};

@@ -17,9 +17,10 @@ uint64_t block_bytes(uint64_t heap, MemoryKind kind) {
 
 }  // namespace
 
-void Memory::init(VkPhysicalDevice physical, VkDevice device, const VolkDeviceTable* vk) {
+void Memory::init(VkPhysicalDevice physical, VkDevice device, const VolkDeviceTable* vk, bool addresses) {
     device_ = device;
     vk_ = vk;
+    addresses_ = addresses;
     vkGetPhysicalDeviceMemoryProperties(physical, &properties_);
     VkPhysicalDeviceProperties p;
     vkGetPhysicalDeviceProperties(physical, &p);
@@ -64,8 +65,12 @@ Result<Block*> Memory::add_block(uint64_t size, uint32_t type, MemoryKind kind, 
     // Some drivers promise more than the heap has and fail later, in the middle of a frame.
     if (reserved_[heap] + size > properties_.memoryHeaps[heap].size)
         return failure(what, VK_ERROR_OUT_OF_DEVICE_MEMORY);
-    const VkMemoryAllocateInfo info{
-        .sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO, .allocationSize = size, .memoryTypeIndex = type};
+    const VkMemoryAllocateFlagsInfo flags{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_FLAGS_INFO,
+                                          .flags = VK_MEMORY_ALLOCATE_DEVICE_ADDRESS_BIT};
+    const VkMemoryAllocateInfo info{.sType = VK_STRUCTURE_TYPE_MEMORY_ALLOCATE_INFO,
+                                    .pNext = addresses_ && !images ? &flags : nullptr,
+                                    .allocationSize = size,
+                                    .memoryTypeIndex = type};
     VkDeviceMemory memory = VK_NULL_HANDLE;
     if (const VkResult result = vk_->vkAllocateMemory(device_, &info, nullptr, &memory); result != VK_SUCCESS)
         return failure(what, result);

@@ -37,7 +37,8 @@ public:
     Memory(const Memory&) = delete;
     Memory& operator=(const Memory&) = delete;
 
-    void init(VkPhysicalDevice physical, VkDevice device, const VolkDeviceTable* vk);
+    // `addresses`: buffers may be asked for their GPU address.
+    void init(VkPhysicalDevice physical, VkDevice device, const VolkDeviceTable* vk, bool addresses);
     void shutdown();
 
     // `what` names the resource in errors.
@@ -57,6 +58,7 @@ private:
 
     VkDevice device_ = VK_NULL_HANDLE;
     const VolkDeviceTable* vk_ = nullptr;
+    bool addresses_ = false;
     VkPhysicalDeviceMemoryProperties properties_{};
     uint64_t granularity_ = 1;
     uint64_t reserved_[VK_MAX_MEMORY_HEAPS] = {};

@@ -76,7 +76,7 @@ Result<VkDescriptorSet> VulkanDevice::allocate_set(VkDescriptorSetLayout layout,
         if (r != VK_ERROR_OUT_OF_POOL_MEMORY && r != VK_ERROR_FRAGMENTED_POOL) return fail("bind group", r);
     }
     // Room for the fullest groups that the floor allows, on average a quarter of that.
-    const VkDescriptorPoolSize sizes[] = {
+    std::vector<VkDescriptorPoolSize> sizes{
         {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 2 * kSetsPerPool},
         {VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 8 * kSetsPerPool},
         {VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC, kSetsPerPool},
@@ -85,11 +85,12 @@ Result<VkDescriptorSet> VulkanDevice::allocate_set(VkDescriptorSetLayout layout,
         {VK_DESCRIPTOR_TYPE_SAMPLER, 2 * kSetsPerPool},
         {VK_DESCRIPTOR_TYPE_STORAGE_IMAGE, 4 * kSetsPerPool},
     };
+    if (caps_.rt_pipeline) sizes.push_back({VK_DESCRIPTOR_TYPE_ACCELERATION_STRUCTURE_KHR, kSetsPerPool / 8});
     const VkDescriptorPoolCreateInfo create{.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO,
                                             .flags = VK_DESCRIPTOR_POOL_CREATE_FREE_DESCRIPTOR_SET_BIT,
                                             .maxSets = kSetsPerPool,
-                                            .poolSizeCount = uint32_t(std::size(sizes)),
-                                            .pPoolSizes = sizes};
+                                            .poolSizeCount = uint32_t(sizes.size()),
+                                            .pPoolSizes = sizes.data()};
     if (r = vk_.vkCreateDescriptorPool(device_, &create, nullptr, &pool); r != VK_SUCCESS) return fail("bind group", r);
     set_pools_.push_back(pool);
     info.descriptorPool = pool;
@@ -104,6 +105,7 @@ Result<BindGroup> VulkanDevice::create_bind_group(const BindGroupDesc& desc) {
 
     std::vector<VkDescriptorBufferInfo> buffers(desc.entries.size());
     std::vector<VkDescriptorImageInfo> images(desc.entries.size());
+    std::vector<VkWriteDescriptorSetAccelerationStructureKHR> trees(desc.entries.size());
     std::vector<VkWriteDescriptorSet> writes;
     for (size_t i = 0; i < desc.entries.size(); ++i) {
         const BindGroupEntry& entry = desc.entries[i];
@@ -121,6 +123,13 @@ Result<BindGroup> VulkanDevice::create_bind_group(const BindGroupDesc& desc) {
                 return Error{formatted("{}: binding {} has no buffer or starts past its end", what, entry.binding)};
             buffers[i] = {b->vk, entry.offset, std::min(entry.size, b->desc.size - entry.offset)};
             write.pBufferInfo = &buffers[i];
+        } else if (slot->kind == BindingKind::BoxTree) {
+            const Buffer* b = find(entry.buffer);
+            if (!b || !b->top) return Error{formatted("{}: binding {} has no box tree", what, entry.binding)};
+            trees[i] = {.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET_ACCELERATION_STRUCTURE_KHR,
+                        .accelerationStructureCount = 1,
+                        .pAccelerationStructures = &b->top};
+            write.pNext = &trees[i];
         } else if (slot->kind == BindingKind::Sampler) {
             const Sampler* s = found(samplers_.get(entry.sampler), "sampler");
             if (!s) return Error{formatted("{}: binding {} has no sampler", what, entry.binding)};
@@ -155,8 +164,7 @@ Result<VkPipelineLayout> VulkanDevice::make_layout(std::span<const BindGroupLayo
         if (!l) return Error{"pipeline layout: stale bind group layout"};
         sets.push_back(l->vk);
     }
-    const VkPushConstantRange push{
-        VK_SHADER_STAGE_VERTEX_BIT | VK_SHADER_STAGE_FRAGMENT_BIT | VK_SHADER_STAGE_COMPUTE_BIT, 0, push_bytes};
+    const VkPushConstantRange push{stages_.push, 0, push_bytes};
     const VkPipelineLayoutCreateInfo info{.sType = VK_STRUCTURE_TYPE_PIPELINE_LAYOUT_CREATE_INFO,
                                           .setLayoutCount = uint32_t(sets.size()),
                                           .pSetLayouts = sets.data(),
@@ -232,39 +240,49 @@ Result<ComputePipeline> VulkanDevice::create_compute_pipeline(const ComputePipel
 
 Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipelineDesc& desc) {
     if (!draws()) return Error{formatted("pipeline '{}': the device's queue doesn't draw", desc.label)};
-    const Shader* vertex = found(shaders_.get(desc.vertex), "shader module");
-    const Shader* fragment = desc.fragment ? found(shaders_.get(desc.fragment), "shader module") : nullptr;
-    if (!vertex || (desc.fragment && !fragment))
-        return Error{formatted("pipeline '{}': stale shader module", desc.label)};
+    struct Stage {
+        VkShaderStageFlagBits bit;
+        const Shader* shader;
+        std::string entry;
+    };
+    std::vector<Stage> modules;
+    bool stale = false;
+    const auto add = [&](VkShaderStageFlagBits bit, ShaderModule module, std::string_view entry) {
+        const Shader* shader = found(shaders_.get(module), "shader module");
+        stale = stale || !shader;
+        modules.push_back({bit, shader, std::string(entry)});
+    };
+    if (desc.mesh) {
+        if (!caps_.mesh_shader) return Error{formatted("pipeline '{}': the device has no mesh shaders", desc.label)};
+        add(VK_SHADER_STAGE_MESH_BIT_EXT, desc.mesh, "main");
+    } else {
+        add(VK_SHADER_STAGE_VERTEX_BIT, desc.vertex, desc.vertex_entry);
+    }
+    if (desc.fragment) add(VK_SHADER_STAGE_FRAGMENT_BIT, desc.fragment, desc.fragment_entry);
+    if (stale) return Error{formatted("pipeline '{}': stale shader module", desc.label)};
     if (desc.colors.size() > kMaxColorTargets)
         return Error{formatted("pipeline '{}': too many colour targets", desc.label)};
 
     Pipeline p{.label = std::string(desc.label),
-               .reflection = vertex->reflection,
+               .reflection = modules[0].shader->reflection,
                .groups = {},
                .vk = {},
                .layout = {},
                .owns_layout = false};
-    std::vector<const Reflection*> reflections{&vertex->reflection};
-    if (fragment) {
-        reflections.push_back(&fragment->reflection);
-        p.reflection.push_bytes = std::max(p.reflection.push_bytes, fragment->reflection.push_bytes);
+    std::vector<const Reflection*> reflections;
+    for (const Stage& m : modules) {
+        reflections.push_back(&m.shader->reflection);
+        p.reflection.push_bytes = std::max(p.reflection.push_bytes, m.shader->reflection.push_bytes);
     }
     if (Result<void> r = choose_layout(p, desc.layout, reflections); !r) return r.error();
 
-    const std::string vertex_entry(desc.vertex_entry);
-    const std::string fragment_entry(desc.fragment_entry);
     const Specialization special(desc.constants);
-    std::vector<VkPipelineShaderStageCreateInfo> stages{{.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                                                         .stage = VK_SHADER_STAGE_VERTEX_BIT,
-                                                         .module = vertex->vk,
-                                                         .pName = vertex_entry.c_str(),
-                                                         .pSpecializationInfo = &special.info}};
-    if (fragment)
+    std::vector<VkPipelineShaderStageCreateInfo> stages;
+    for (const Stage& m : modules)
         stages.push_back({.sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO,
-                          .stage = VK_SHADER_STAGE_FRAGMENT_BIT,
-                          .module = fragment->vk,
-                          .pName = fragment_entry.c_str(),
+                          .stage = m.bit,
+                          .module = m.shader->vk,
+                          .pName = m.entry.c_str(),
                           .pSpecializationInfo = &special.info});
 
     std::vector<VkVertexInputBindingDescription> bindings;
@@ -331,8 +349,8 @@ Result<RenderPipeline> VulkanDevice::create_render_pipeline(const RenderPipeline
                                             .pNext = &rendering,
                                             .stageCount = uint32_t(stages.size()),
                                             .pStages = stages.data(),
-                                            .pVertexInputState = &input,
-                                            .pInputAssemblyState = &assembly,
+                                            .pVertexInputState = desc.mesh ? nullptr : &input,
+                                            .pInputAssemblyState = desc.mesh ? nullptr : &assembly,
                                             .pViewportState = &viewport,
                                             .pRasterizationState = &raster,
                                             .pMultisampleState = &samples,
@@ -366,6 +384,11 @@ BindGroupLayout VulkanDevice::group_layout(ComputePipeline pipeline, uint32_t in
 }
 
 BindGroupLayout VulkanDevice::group_layout(RenderPipeline pipeline, uint32_t index) {
+    const Pipeline* p = find(pipeline);
+    return p && index < p->groups.size() ? p->groups[index] : BindGroupLayout{};
+}
+
+BindGroupLayout VulkanDevice::group_layout(TracePipeline pipeline, uint32_t index) {
     const Pipeline* p = find(pipeline);
     return p && index < p->groups.size() ? p->groups[index] : BindGroupLayout{};
 }

@@ -70,6 +70,9 @@ Result<VkBuffer> VulkanDevice::make_buffer(const BufferDesc& desc) {
 
 Result<BufferHandle> VulkanDevice::create_buffer(const BufferDesc& desc) {
     if (desc.size == 0) return Error{quoted("buffer", desc.label) + ": size 0"};
+    if (any(desc.usage & BufferUsage::BoxTree) && desc.size < box_tree_bytes(1))
+        return Error{
+            formatted("buffer '{}': {} B, the least box tree takes {}", desc.label, desc.size, box_tree_bytes(1))};
     if (desc.size > limits_.max_buffer)
         return Error{formatted("buffer '{}': {} B, the device allows {}", desc.label, desc.size, limits_.max_buffer),
                      ErrorKind::OutOfMemory};
@@ -104,6 +107,15 @@ Result<BufferHandle> VulkanDevice::create_buffer(const BufferDesc& desc) {
         return fail(quoted("buffer", desc.label), bound);
     }
     label(VK_OBJECT_TYPE_BUFFER, *vk, b.label);
+    if (any(desc.usage & BufferUsage::BoxTree)) {
+        Result<VkAccelerationStructureKHR> top = make_tree(*vk, 0, top_bytes_.tree, true);
+        if (!top) {
+            vk_.vkDestroyBuffer(device_, *vk, nullptr);
+            memory_.release(b.memory);
+            return top.error();
+        }
+        b.top = *top;
+    }
     return buffers_.insert(std::move(b));
 }
 
@@ -308,7 +320,11 @@ void VulkanDevice::destroy(HeapHandle handle) {
 }
 
 void VulkanDevice::destroy(BufferHandle handle) {
-    if (auto b = take(buffers_, handle, "buffer")) retire(VK_OBJECT_TYPE_BUFFER, b->vk, b->memory);
+    auto b = take(buffers_, handle, "buffer");
+    if (!b) return;
+    for (const VkAccelerationStructureKHR tree : {b->top, b->bottom})
+        if (tree) retire(VK_OBJECT_TYPE_ACCELERATION_STRUCTURE_KHR, tree);
+    retire(VK_OBJECT_TYPE_BUFFER, b->vk, b->memory);
 }
 
 void VulkanDevice::destroy(TextureHandle handle) {
@@ -361,6 +377,9 @@ void VulkanDevice::destroy_now(const Garbage& g) {
         vk_.vkFreeDescriptorSets(device_, g.pool, 1, &set);
         break;
     }
+    case VK_OBJECT_TYPE_ACCELERATION_STRUCTURE_KHR:
+        vk_.vkDestroyAccelerationStructureKHR(device_, VkAccelerationStructureKHR(g.object), nullptr);
+        break;
     case VK_OBJECT_TYPE_QUERY_POOL:
         vk_.vkDestroyQueryPool(device_, VkQueryPool(g.object), nullptr);
         break;
