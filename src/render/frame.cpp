@@ -143,18 +143,8 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
 
 }  // namespace
 
-namespace {
-
-Visibility see(Graph& g, const TileInputs& in) {
-    Visibility seen = march(g, in);
-    march_instances(g, in, seen);
-    return seen;
-}
-
-}  // namespace
-
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
-    const Visibility seen = see(g, in);
+    const Visibility seen = march(g, in);
     Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
     if (in.refine) refine_instances(g, in, seen.words, refined);
     TileResult out = record_shading(g, in, wanted, seen.words, refined);
@@ -163,7 +153,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
 }
 
 TileSeen record_visibility(Graph& g, const TileInputs& in) {
-    const Visibility seen = see(g, in);
+    const Visibility seen = march(g, in);
     TileSeen out{g.readback(seen.words), {}};
     for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
     return out;
@@ -177,7 +167,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
-    if (!in.analytic) out.push_back(in.levels ? &kMarchLevels : &kMarch);
+    if (!in.analytic) out.push_back(&march_kernel(in));
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));

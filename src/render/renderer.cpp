@@ -116,7 +116,7 @@ struct Renderer::Impl {
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
-        in.has_instances = !frame.instances.empty();
+        in.has_instances = !instances->nodes().empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
         return in;
@@ -327,12 +327,12 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
+    instances->place(frame.instances, *params);
     const TileInputs switches = inputs(frame, settings);
     if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
         !warm)
         return warm.error();
     params->sky = shade::sky_params(frame);
-    instances->place(frame.instances, *params);
     const bool taa = settings.taa && settings.view == View::Shaded;
     if (taa && tiles_of(settings, frame.lights.size()) > 1)
         return Error{

@@ -19,9 +19,9 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
-    kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
-    kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kResolve,
+    kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
+    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
@@ -88,6 +88,8 @@ struct Visibility {
     Image words;
     std::vector<Buffer> evaluations;
 };
+const Kernel& march_kernel(const TileInputs& in);
+// First hits on the field and on instances.
 Visibility march(Graph& g, const TileInputs& in);
 
 struct Surface {
