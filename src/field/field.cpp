@@ -98,14 +98,19 @@ private:
         ivec3 task;
         TaskResult& result;
         std::span<const CellBox> earlier = {};  // an update of few cells: boxes that have had their cells
+        std::span<const CellBox> dirty = {};    // else: those that meet the task
 
         bool whole() const { return builder.old_ == nullptr; }
-        bool wants(const CellBox& box) const { return whole() || builder.is_dirty(box); }
+        bool wants(const CellBox& box) const {
+            return whole() || earlier.data() != nullptr ||
+                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
+        }
         bool wants(ivec3 cell) const {
             if (earlier.data() != nullptr)
                 return std::none_of(earlier.begin(), earlier.end(),
                                     [&](const CellBox& b) { return contains(b, cell); });
-            return whole() || builder.is_dirty(cell);
+            return whole() ||
+                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return contains(b, cell); });
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {
@@ -206,12 +211,11 @@ private:
                 inserted_.push_back(change.inserted);
             }
         }
+        std::sort(removed_.begin(), removed_.end());
+        std::sort(inserted_.begin(), inserted_.end());
         occupancy_changes_.resize(dirty_.size(), CellBox{});
     }
 
-    bool is_dirty(ivec3 c) const {
-        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return contains(b, c); });
-    }
     bool is_dirty(const CellBox& box) const {
         return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return meet(box, b); });
     }
@@ -239,7 +243,11 @@ private:
         results_.resize(tasks_.size());
         parallel_for(tasks_.size(), options_.workers, [&](int i) {
             CellMaker maker = this->maker();
-            TaskSink sink{*this, tasks_[size_t(i)], results_[size_t(i)]};
+            const CellBox task{tasks_[size_t(i)], tasks_[size_t(i)] + all_of(kBlockCells)};
+            std::vector<CellBox> dirty;
+            for (const CellBox& box : dirty_)
+                if (meet(box, task)) dirty.push_back(box);
+            TaskSink sink{*this, tasks_[size_t(i)], results_[size_t(i)], {}, dirty};
             maker.run_block(tasks_[size_t(i)], {{0, 0, 0}, size_}, sink);
             count(maker, results_[size_t(i)]);
         });
