@@ -182,6 +182,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.has_meshes) out.push_back(&kMeshShadow);
     out.push_back(&light_kernel(in));
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
+    if (in.taa && in.moved.owners.count > 0) out.push_back(&specialised(kOutlineMask, in.moved.owners.use));
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Pyramid)

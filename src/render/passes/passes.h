@@ -40,6 +40,19 @@ void store_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, st
 
 const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
 
+// Edits, each with its own code, whose pixels are asked for.
+struct OwnerHandles {
+    Buffer records, code;  // OutlineRecord
+    uint32_t count = 0;
+    TapeUse use;
+};
+// What of the field moved or changed since the frame before.
+struct MovedHandles {
+    OwnerHandles owners;
+    Buffer edits, boxes;  // MovedRecord of each owner; ChangedBox
+    bool has_boxes = false;
+};
+
 // What every pass of one tile reads.
 struct TileInputs {
     FieldHandles field;
@@ -81,6 +94,7 @@ struct TileInputs {
     TapeUse use_of_outlines;
     MeshHandles meshes;
     bool has_meshes = false;
+    MovedHandles moved;  // with taa
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -135,12 +149,15 @@ struct OutlineCode {
     std::vector<OutlineRecord> records;
     std::vector<sdf::Instruction> code;
     float widest = 0;
-    int left_out = 0;  // no code for a GPU
+    int left_out = 0;          // no code for a GPU
+    std::vector<uint32_t> of;  // the outline that each record is
 };
-OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program);
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program,
+                         std::span<const Instance> instances);
 struct OutlineMask {
     Image owners, seeds;
 };
+OutlineMask edit_owners(Graph& g, const TileInputs& in, const OwnerHandles& asked, const Image& visibility);
 OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility);
 // Seeds of the pixels that lines reach.
 Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest);
