@@ -45,7 +45,8 @@ MovedRecord record_of(const EditMotion& m, const double (&eye)[3]) {
 
 MovedEdits moved_edits(const Frame& frame, const sdf::Program& program, const FrameParams& params) {
     const double h = double(params.grid.voxel_size);
-    const double eye[3] = {(params.eye_x + double(params.eye_part_x)) * h, (params.eye_y + double(params.eye_part_y)) * h,
+    const double eye[3] = {(params.eye_x + double(params.eye_part_x)) * h,
+                           (params.eye_y + double(params.eye_part_y)) * h,
                            (params.eye_z + double(params.eye_part_z)) * h};
     MovedEdits out;
     std::vector<EditOutline> rows;

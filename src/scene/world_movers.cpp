@@ -264,12 +264,14 @@ std::shared_ptr<const sdf::Program> World::Impl::whole() {
     uint64_t order = edits.last() == EditList::kNone ? 0 : list.edits[edits[edits.last()].row].order;
     for (auto& [key, m] : movers) {
         if (!m.apart) continue;
-        order = sdf::order_between(order, UINT64_MAX);
-        auto placed = sdf::place(out, *m.object, m.pose, m.material, order);
+        // A dynamic edit is folded where it stands in the list: far from surfaces, later blends lead its values on.
+        uint64_t place = list.edits[edits[m.slots.front()].row].order;
+        if (m.body != Mover::kNoBody) place = order = sdf::order_between(order, UINT64_MAX);
+        auto placed = sdf::place(out, *m.object, m.pose, m.material, place);
         if (!placed) {
             // The list has moved its samples since.
             const std::shared_ptr<const field::BrickSet> baked = m.bricks;
-            if (compile_mover(m)) placed = sdf::place(out, *m.object, m.pose, m.material, order);
+            if (compile_mover(m)) placed = sdf::place(out, *m.object, m.pose, m.material, place);
             m.bricks = baked;
         }
         KILN_ASSERT(bool(placed), "{}", placed ? "" : placed.error().message);
