@@ -80,10 +80,17 @@ struct Instance {
     uint32_t material = 0;                          ///< number of what its parts without a material are made of
 };
 
-/// A line around an edit, by its row in the field's program.
+/// A line around an edit, by its row in the field's program, or in that of the instance that it is part of.
 struct EditOutline {
     uint32_t row = 0;
     Outline outline;
+    uint32_t instance = UINT32_MAX;  ///< number of the instance
+};
+
+/// An edit of the field that stood elsewhere in the frame before: what is nearest to it has moved with it.
+struct EditMotion {
+    uint32_t row = 0;       ///< of the field's program
+    Transform now, before;  ///< its own
 };
 
 /// A triangle mesh in the world.
@@ -106,6 +113,9 @@ struct Frame {
     std::vector<EditOutline> outlines;  ///< of shaded pictures
     std::vector<MeshInstance> meshes;
     double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
+    std::vector<EditMotion> moved;     ///< for motion
+    std::vector<Box3>
+        changed;  ///< where the field has become another since the frame before: nothing of it was anywhere
 };
 
 /// Ways to the same picture. Compute is there on every device; the others march the bricks of a world of one level by a ray-tracing

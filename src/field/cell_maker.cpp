@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "field/cell_maker.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace kiln::field {
@@ -43,7 +44,7 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
     if (!(sdf::ListCuller::start_of(code, program) == start)) return false;
     return rows.empty() || std::none_of(code.begin(), code.end(), [&](sdf::Instruction in) {
                return in.has_material() &&
-                      std::find(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2])) != rows.end();
+                      std::binary_search(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2]));
            });
 }
 

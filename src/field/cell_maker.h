@@ -47,7 +47,7 @@ inline ivec3 all_of(int a) { return {a, a, a}; }
 /// World cells whose bricks an edit can change; far beyond any world where it is everywhere. Empty: none.
 CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size);
 
-/// Whether a brick's code stays what it was when `rows` go, and it would begin so.
+/// Whether a brick's code stays what it was when `rows`, in ascending order, go, and it would begin so.
 bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,
            sdf::ListCuller::Start start);
 

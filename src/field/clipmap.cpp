@@ -2,9 +2,10 @@
 // Work is done in blocks of 16³ cells (cell_maker.h), several at a time; what they made is put in place by the owner's thread, in order, so
 // that with a budget in bricks alone nothing depends on the number of workers.
 //
-// Order of work: the last level, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are
-// missing too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser
-// level under it, and one mix of two levels is enough everywhere.
+// Order of work: what is drawn of the last level, whatever it costs; changes, the oldest and finest first, with half of the budget where
+// cells are missing too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the
+// coarser level under it, and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window
+// just moved, so in a steady flight the last level's shells are made, within the budget, before they are seen.
 
 #include "field/clipmap.h"
 
@@ -129,6 +130,15 @@ LevelsParams Clipmap::params() const {
     return out;
 }
 
+// A voxel more on each side, which normals look at.
+CellBox Clipmap::drawn(int level) const {
+    const double h = double(voxel_size(level)), reach = double(level_reach(options_.cells)) + 1;
+    const auto cell = [&](double at, double by) { return int(std::floor((at / h + by) / kBrickVoxels)); };
+    return common(window(level),
+                  {{cell(focus_.x, -reach), cell(focus_.y, -reach), cell(focus_.z, -reach)},
+                   ivec3{cell(focus_.x, reach), cell(focus_.y, reach), cell(focus_.z, reach)} + all_of(1)});
+}
+
 // The window's first cell, an even number: its faces are faces of the coarser level's cells. An axis follows only when the focus is more
 // than kSlackCells off its middle.
 ivec3 Clipmap::first_cell_for(int level, dvec3 focus, const ivec3* old) const {
@@ -234,6 +244,8 @@ void Clipmap::begin(Batch& batch, int level) const {
             if (!box.empty()) batch.boxes.push_back(box);
         }
     }
+    std::sort(batch.removed.begin(), batch.removed.end());
+    std::sort(batch.inserted.begin(), batch.inserted.end());
     add_parts(batch, window(level));
 }
 
@@ -290,15 +302,16 @@ struct SinkBase {
 
 }  // namespace
 
-// Makes missing cells. True when the level has none left but refused ones.
-bool Clipmap::fill(int level, Run& run) {
+// Makes missing cells of a part of the window. True when the level has none left there but refused ones.
+bool Clipmap::fill(int level, Run& run, const CellBox& where) {
     Level& l = levels_[size_t(level)];
     if (l.blocks.empty()) return true;
     const CellBox window = this->window(level);
 
     struct Sink : SinkBase<Made> {
         const CellMap& cells;
-        bool wants(ivec3 c) const { return cells.at(c.x, c.y, c.z) == kCellMissing; }
+        const CellBox& where;
+        bool wants(ivec3 c) const { return contains(where, c) && cells.at(c.x, c.y, c.z) == kCellMissing; }
         bool wants(const CellBox& box) const {
             for (int z = box.min.z; z < box.max.z; ++z) {
                 for (int y = box.min.y; y < box.max.y; ++y) {
@@ -328,6 +341,17 @@ bool Clipmap::fill(int level, Run& run) {
         return da != db ? da < db : before(a, b);
     });
     std::vector<ivec3> left;
+    // Blocks with cells outside of `where` stay queued.
+    const auto inside = [&](ivec3 block) {
+        const CellBox part = common(cells_of(block), window), here = common(part, where);
+        return here.min == part.min && here.max == part.max;
+    };
+    std::vector<ivec3> outside;
+    std::erase_if(l.blocks, [&](ivec3 block) {
+        if (meet(cells_of(block), where)) return false;
+        outside.push_back(block);
+        return true;
+    });
     size_t next = 0;
     while (next < l.blocks.size() && run.goes_on()) {
         const std::span<const ivec3> wave = std::span(l.blocks).subspan(next, run.wave(l.blocks.size() - next));
@@ -336,20 +360,25 @@ bool Clipmap::fill(int level, Run& run) {
         const uint32_t share = run.bricks == kUnlimited ? kUnlimited : std::max(run.bricks / uint32_t(wave.size()), 1u);
         parallel_for(wave.size(), run.workers, [&](int i) {
             CellMaker maker(*l.program, lattice(level, wave[size_t(i)]));
-            Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, l.cells};
-            maker.run_block(wave[size_t(i)], window, sink);
+            Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, l.cells, where};
+            maker.run_block(wave[size_t(i)], common(window, where), sink);
         });
         for (size_t i = 0; i < wave.size(); ++i) {
             run.spend(made[i].leaves.size());
             l.counts.baked += uint32_t(made[i].leaves.size());
             l.counts.cells_made += made[i].cells;
             publish(level, made[i], window);
-            if (made[i].stopped) left.push_back(wave[i]);
+            if (made[i].stopped)
+                left.push_back(wave[i]);
+            else if (!inside(wave[i]))
+                outside.push_back(wave[i]);
         }
     }
     left.insert(left.end(), l.blocks.begin() + ptrdiff_t(next), l.blocks.end());
+    const bool done = left.empty();
+    left.insert(left.end(), outside.begin(), outside.end());
     l.blocks = std::move(left);
-    return l.blocks.empty();
+    return done;
 }
 
 // Makes what changes reach, and shows it when it is whole. True when no change is left.
@@ -360,6 +389,7 @@ bool Clipmap::apply(int level, Run& run) {
         const Clipmap& map;
         const Level& level;
         const Batch& batch;
+        std::span<const CellBox> boxes;  // of the batch, those that meet the part
         Part& part;
 
         size_t bit(ivec3 c) const {
@@ -372,11 +402,11 @@ bool Clipmap::apply(int level, Run& run) {
             part.done[bit(c) / 64] |= uint64_t(1) << (bit(c) % 64);
         }
         bool wants(const CellBox& box) const {
-            return std::any_of(batch.boxes.begin(), batch.boxes.end(), [&](const CellBox& b) { return meet(b, box); });
+            return std::any_of(boxes.begin(), boxes.end(), [&](const CellBox& b) { return meet(b, box); });
         }
         bool wants(ivec3 c) const {
-            return !done(c) && std::any_of(batch.boxes.begin(), batch.boxes.end(),
-                                           [&](const CellBox& b) { return contains(b, c); });
+            return !done(c) &&
+                   std::any_of(boxes.begin(), boxes.end(), [&](const CellBox& b) { return contains(b, c); });
         }
         void air(const CellBox& box) {
             each_cell(box, [&](ivec3 c) {
@@ -417,8 +447,12 @@ bool Clipmap::apply(int level, Run& run) {
                 Part& part = wave[size_t(i)];
                 const CellBox bounds = common(part.clip, window);
                 if (bounds.empty()) return;
+                std::vector<CellBox> boxes;
+                for (const CellBox& b : batch.boxes)
+                    if (meet(b, bounds)) boxes.push_back(b);
                 CellMaker maker(*batch.program, lattice(level, part.block), batch.inserted);
-                Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, *this, l, batch, part};
+                Sink sink{
+                    {made[size_t(i)], options_.format, share, run.timed, run.deadline}, *this, l, batch, boxes, part};
                 maker.run_block(part.block, bounds, sink);
             });
             for (size_t i = 0; i < count; ++i) {
@@ -559,20 +593,20 @@ bool Clipmap::work(const BakeBudget& budget) {
 
     Run all{.workers = options_.workers};
     const int last = options_.levels - 1;
-    apply(last, all);
-    fill(last, all);
+    fill(last, all, drawn(last));
 
     Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
     if (run.timed)
         run.deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                           std::chrono::duration<double>(std::max(budget.seconds, 0.0)));
+    run.spend(levels_[size_t(last)].counts.baked);
     std::vector<int> changes;
     bool missing = false;
-    for (int level = 0; level < last; ++level) {
+    for (int level = 0; level <= last; ++level) {
         Level& l = levels_[size_t(level)];
         if (l.active) changes.push_back(level);
         // As many bricks as a sheet through the shell has, or twice that where a window is 64 cells.
-        l.counts.skipped = 2 * uint64_t(l.shell) / uint64_t(options_.cells) > budget.bricks;
+        l.counts.skipped = level < last && 2 * uint64_t(l.shell) / uint64_t(options_.cells) > budget.bricks;
         missing = missing || (!l.blocks.empty() && !l.counts.skipped);
     }
     std::stable_sort(changes.begin(), changes.end(),
@@ -591,8 +625,8 @@ bool Clipmap::work(const BakeBudget& budget) {
     } else {
         apply_all(run);
     }
-    for (int level = last - 1; level >= 0; --level) {
-        if (levels_[size_t(level)].counts.skipped || !fill(level, run)) break;
+    for (int level = last; level >= 0; --level) {
+        if (levels_[size_t(level)].counts.skipped || !fill(level, run, window(level))) break;
     }
     apply_all(run);
     for (Level& l : levels_) l.shell = 0;

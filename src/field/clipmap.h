@@ -32,7 +32,8 @@ struct ClipmapOptions {
     int workers = 0;                 ///< 0: all cores
 };
 
-/// What one work() may cost. The last level is made whole whatever it costs, or the picture would have a hole.
+/// What one work() may cost. What is drawn of the last level is there at once, whatever it costs, or the picture would have a hole; it
+/// counts, and what comes into that level's window lies outside of what is drawn for a while, so that only jumps exceed the budget.
 struct BakeBudget {
     uint32_t bricks = std::numeric_limits<uint32_t>::max();
     double seconds = std::numeric_limits<double>::infinity();  ///< asked between bricks: the last one ends late
@@ -73,6 +74,8 @@ public:
     /// First world cell of the window.
     ivec3 first_cell(int level) const { return levels_[size_t(level)].first; }
     CellBox window(int level) const;
+    /// The part of the window that the level is drawn in from this focus.
+    CellBox drawn(int level) const;
     const CellMap& cells(int level) const { return levels_[size_t(level)].cells; }
     /// Word of a world cell in the window.
     uint32_t cell_word(int level, ivec3 cell) const { return cells(level).at(cell.x, cell.y, cell.z); }
@@ -157,7 +160,7 @@ private:
     void queue_blocks(Level& level, const CellBox& box) const;
     void begin(Batch& batch, int level) const;
     void add_parts(Batch& batch, const CellBox& clip) const;
-    bool fill(int level, Run& run);
+    bool fill(int level, Run& run, const CellBox& where);
     bool apply(int level, Run& run);
     void publish(int level, Made& made, const CellBox& window);
     void release(int level, uint32_t slot);

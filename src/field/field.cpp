@@ -14,6 +14,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -78,7 +79,7 @@ public:
                 results_.resize(dirty_.size());
                 CellMaker maker = this->maker();
                 for (size_t i = 0; i < dirty_.size(); ++i) {
-                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i)};
+                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i), {}, was_reached_};
                     maker.run_box(dirty_[i], sink);
                 }
                 count(maker, results_[0]);
@@ -98,14 +99,20 @@ private:
         ivec3 task;
         TaskResult& result;
         std::span<const CellBox> earlier = {};  // an update of few cells: boxes that have had their cells
+        std::span<const CellBox> dirty = {};    // else: those that meet the task
+        std::span<const CellBox> gone = {};     // where edits were that are gone, of those that may meet the task
 
         bool whole() const { return builder.old_ == nullptr; }
-        bool wants(const CellBox& box) const { return whole() || builder.is_dirty(box); }
+        bool wants(const CellBox& box) const {
+            return whole() || earlier.data() != nullptr ||
+                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
+        }
         bool wants(ivec3 cell) const {
             if (earlier.data() != nullptr)
                 return std::none_of(earlier.begin(), earlier.end(),
                                     [&](const CellBox& b) { return contains(b, cell); });
-            return whole() || builder.is_dirty(cell);
+            return whole() ||
+                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return contains(b, cell); });
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {
@@ -122,7 +129,8 @@ private:
         bool keeps(ivec3 cell, Inserted inserted, sdf::ListCuller::Start start) const {
             if (whole()) return false;
             const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
-            if ((word & kCellOccupied) == 0) return inserted == Inserted::NoEffect && !builder.was_reached(cell);
+            if ((word & kCellOccupied) == 0) return inserted == Inserted::NoEffect &&
+                       std::none_of(gone.begin(), gone.end(), [&](const CellBox& b) { return contains(b, cell); });
             return inserted != Inserted::Shows &&
                    stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);
         }
@@ -209,16 +217,11 @@ private:
                 inserted_.push_back(change.inserted);
             }
         }
+        std::sort(removed_.begin(), removed_.end());
+        std::sort(inserted_.begin(), inserted_.end());
         occupancy_changes_.resize(dirty_.size(), CellBox{});
     }
 
-    // By an edit that is gone.
-    bool was_reached(ivec3 c) const {
-        return std::any_of(was_reached_.begin(), was_reached_.end(), [&](const CellBox& b) { return contains(b, c); });
-    }
-    bool is_dirty(ivec3 c) const {
-        return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return contains(b, c); });
-    }
     bool is_dirty(const CellBox& box) const {
         return std::any_of(dirty_.begin(), dirty_.end(), [&](const CellBox& b) { return meet(box, b); });
     }
@@ -246,7 +249,15 @@ private:
         results_.resize(tasks_.size());
         parallel_for(tasks_.size(), options_.workers, [&](int i) {
             CellMaker maker = this->maker();
-            TaskSink sink{*this, tasks_[size_t(i)], results_[size_t(i)]};
+            const CellBox task{tasks_[size_t(i)], tasks_[size_t(i)] + all_of(kBlockCells)};
+            const auto meeting = [&](const std::vector<CellBox>& boxes) {
+                std::vector<CellBox> out;
+                std::copy_if(boxes.begin(), boxes.end(), std::back_inserter(out),
+                             [&](const CellBox& box) { return meet(box, task); });
+                return out;
+            };
+            const std::vector<CellBox> dirty = meeting(dirty_), gone = meeting(was_reached_);
+            TaskSink sink{*this, tasks_[size_t(i)], results_[size_t(i)], {}, dirty, gone};
             maker.run_block(tasks_[size_t(i)], {{0, 0, 0}, size_}, sink);
             count(maker, results_[size_t(i)]);
         });

@@ -143,18 +143,8 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
 
 }  // namespace
 
-namespace {
-
-Visibility see(Graph& g, const TileInputs& in) {
-    Visibility seen = march(g, in);
-    march_instances(g, in, seen);
-    return seen;
-}
-
-}  // namespace
-
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
-    const Visibility seen = see(g, in);
+    const Visibility seen = march(g, in);
     Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
     if (in.refine) refine_instances(g, in, seen.words, refined);
     TileResult out = record_shading(g, in, wanted, seen.words, refined);
@@ -163,7 +153,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
 }
 
 TileSeen record_visibility(Graph& g, const TileInputs& in) {
-    const Visibility seen = see(g, in);
+    const Visibility seen = march(g, in);
     TileSeen out{g.readback(seen.words), {}};
     for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
     return out;
@@ -177,7 +167,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
-    if (!in.analytic && !in.rt) out.push_back(in.levels ? &kMarchLevels : &kMarch);
+    if (!in.analytic && !in.rt) out.push_back(&march_kernel(in));
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
@@ -192,6 +182,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.has_meshes) out.push_back(&kMeshShadow);
     out.push_back(&light_kernel(in));
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
+    if (in.taa && in.moved.owners.count > 0) out.push_back(&specialised(kOutlineMask, in.moved.owners.use));
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Pyramid)

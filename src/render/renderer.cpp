@@ -5,6 +5,7 @@
 #include "base/format.h"
 #include "base/log.h"
 #include "field/field.h"
+#include "render/edit_motion.h"
 #include "render/frame.h"
 #include "render/gpu_boxes.h"
 #include "render/lens.h"
@@ -60,6 +61,7 @@ struct Renderer::Impl {
     std::optional<Before> before;
     uint64_t taa_frame = 0;
     OutlineCode outlined;  // of the frame
+    MovedEdits moved;      // likewise, with taa
 
     ~Impl() {
         instances.reset();
@@ -119,11 +121,14 @@ struct Renderer::Impl {
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
-        in.has_instances = !frame.instances.empty();
+        in.has_instances = !instances->nodes().empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
         in.rt = traces(frame, settings) && boxes->boxes() > 0;
         in.mesh_shader = settings.tier == Tier::Mesh;
+        in.moved.owners.count = uint32_t(moved.records.size());
+        in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
+        in.moved.has_boxes = !moved.boxes.empty();
         return in;
     }
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
@@ -225,9 +230,21 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
             in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
             in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
         }
-        if (in.taa)
-            in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
-                                              params.width, params.height));
+        if (in.taa) {
+            MotionParams motion = motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
+                                                params.width, params.height);
+            motion.moved_count = in.moved.owners.count;
+            motion.changed_count = uint32_t(moved.boxes.size());
+            in.motion = g.block(motion);
+            if (in.moved.owners.count > 0) {
+                in.moved.owners.records = g.upload("moved edits", std::span<const OutlineRecord>(moved.code.records));
+                in.moved.owners.code =
+                    g.upload("code of moved edits", std::span<const sdf::Instruction>(moved.code.code));
+                in.moved.edits = g.upload("motions of edits", std::span<const MovedRecord>(moved.records));
+            }
+            if (in.moved.has_boxes)
+                in.moved.boxes = g.upload("changed boxes", std::span<const ChangedBox>(moved.boxes));
+        }
         in.meshes = meshes->import(g);
         if (in.rt) in.boxes = boxes->import(g);
         return in;
@@ -301,6 +318,9 @@ Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSe
     Frame merged = frame;
     merged.field = std::move(*field_of_all);
     merged.instances.clear();
+    // An object is one edit of the merged program: there is no code of its parts alone.
+    const size_t lines = std::erase_if(merged.outlines, [](const EditOutline& o) { return o.instance != UINT32_MAX; });
+    if (lines > 0) log::warn("analytic: outlines of {} edits of things that move are not drawn", lines);
     auto picture = render(merged, settings);
     stats.instances = int(frame.instances.size());
     // Each is one edit of the merged program, whatever it is made of.
@@ -344,7 +364,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     outlined = {};
     if (settings.view == View::Shaded && !frame.outlines.empty()) {
         if (tiles_of(settings, frame.lights.size()) == 1)
-            outlined = outline_code(frame.outlines, program);
+            outlined = outline_code(frame.outlines, program, frame.instances);
         else
             log::warn("outlines are not drawn: the picture is several tiles");
         if (outlined.left_out > 0)
@@ -353,13 +373,15 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
+    instances->place(frame.instances, *params);
+    moved = {};
+    if (settings.taa && settings.view == View::Shaded) moved = moved_edits(frame, program, *params);
     const TileInputs switches = inputs(frame, settings);
     if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches),
                                                 frame_trace_kernels(switches));
         !warm)
         return warm.error();
     params->sky = shade::sky_params(frame);
-    instances->place(frame.instances, *params);
     const bool taa = settings.taa && settings.view == View::Shaded;
     if (taa && tiles_of(settings, frame.lights.size()) > 1)
         return Error{

@@ -25,6 +25,7 @@ struct Mover {
     std::shared_ptr<const sdf::Program> object;     ///< its edits in its frame
     std::shared_ptr<const field::BrickSet> bricks;  ///< made when it is first drawn …
     float bricks_for = 0;                           ///< … beside a field of this voxel size
+    uint32_t drawn_as = 0;                          ///< number of its instance in the last frame
 };
 
 /// Rigid part of an edit's transform.

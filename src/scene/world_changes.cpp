@@ -75,6 +75,8 @@ Result<void> World::Impl::exchange_edit(Change& change) {
     }
     if (compile_later) return {};
     if (removed != field::kNoRow) list.remove(removed);
+    changed_since_frame(change.id.index, change.what == What::Order ? edits[slot].edit.get() : change.get<Edit>(),
+                        removed, inserted);
     row_changed(removed, inserted);
     mover_changed(change.id.index, removed, inserted);
     if (list.edits.size() > 4 * size_t(edits.size()) + kMostOldRows) return compile_all();

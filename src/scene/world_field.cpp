@@ -25,8 +25,9 @@ namespace {
 /// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
 constexpr double kMaxCells = double(1u << 25);
 constexpr int kMostDoublings = 24;
-/// More changes than this since the last field, and it is built anew.
-constexpr size_t kMostChanges = 256;
+/// More changes than this since the last field, and it is built anew: what so large a share of a world reaches is most of it, and finding
+/// the changes of a place takes as long as there are changes.
+size_t most_changes(size_t edits) { return std::clamp<size_t>(edits / 4, 256, 8192); }
 
 float longest_side(const Box3& box) {
     const vec3 size = box.max - box.min;
@@ -46,13 +47,13 @@ void World::Impl::row_changed(uint32_t removed, uint32_t inserted) {
     program.reset();
     all.reset();
     if (levels) level_changes.push_back({removed, inserted});
-    if (level_changes.size() > kMostChanges) {
+    if (level_changes.size() > most_changes(edits.size())) {
         levels.reset();
         level_changes.clear();
     }
     asked.reset();
     if (!built.field) return;
-    if (changes.size() > kMostChanges) {
+    if (changes.size() > most_changes(edits.size())) {
         built = {};
         return forget_changes();
     }
@@ -155,6 +156,7 @@ Result<void> World::Impl::compile_all() {
         level_changes.clear();
     }
     find_movers();
+    all_is_new = true;
     return {};
 }
 
@@ -189,7 +191,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     const Resolution r = resolution(list, settings);
     Built next;
     if (comparable && built.coarsened == 0 && built.field->options().voxel_size == r.voxel_size &&
-        built.field->options().bounds == r.bounds && changes.size() <= kMostChanges) {
+        built.field->options().bounds == r.bounds && changes.size() <= most_changes(edits.size())) {
         const std::vector<field::RowChange> changed = changes_beside(changes, built_apart, apart);
         if (changed.empty()) {
             built_apart = std::move(apart);
@@ -319,12 +321,8 @@ Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) cons
     out.materials.reserve(impl_->data.materials.size() + 1);
     out.materials.emplace_back();  // sdf::kDefaultMaterial
     for (const auto& [name, material] : impl_->data.materials) out.materials.push_back(material);
-    if (impl_->edits.outlined() > 0) {
-        impl_->edits.each([&](uint32_t slot) {
-            const Edit& e = *impl_->edits[slot].edit;
-            if (e.outline && !e.hidden) out.outlines.push_back({impl_->edits[slot].row, *e.outline});
-        });
-    }
+    impl_->outlines_of(out);
+    impl_->motions_of(out);
     out.meshes = impl_->meshes.instances(impl_->data);
     out.lights = lights;
     out.environment = environment;

@@ -158,6 +158,18 @@ struct World::Impl {
     /// What stands apart, beside a field of that voxel size; `shows`: a frame, for the next of which these poses are the ones before.
     Result<void> instances_of(float field_voxel, field::DistanceFormat format, std::vector<Instance>& out,
                               bool shows = true);
+    void outlines_of(Frame& out);
+
+    // What changed since the last frame, for motion (world_motion.cpp).
+    struct Shown {
+        std::optional<Edit> edit;  ///< as the frame had it; none: it was not there
+        Box3 reach;                ///< of all that it was since
+    };
+    bool has_shown = false;           ///< there was a frame
+    bool all_is_new = false;          ///< the list was compiled anew, or too much changed
+    std::map<uint32_t, Shown> shown;  ///< by slot
+    void changed_since_frame(uint32_t slot, const Edit* was, uint32_t removed, uint32_t inserted);
+    void motions_of(Frame& out);
 
     /// The image of the environment: read when its name is first met, brought into shape when it is first drawn.
     struct SkyImage {

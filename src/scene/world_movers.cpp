@@ -264,12 +264,14 @@ std::shared_ptr<const sdf::Program> World::Impl::whole() {
     uint64_t order = edits.last() == EditList::kNone ? 0 : list.edits[edits[edits.last()].row].order;
     for (auto& [key, m] : movers) {
         if (!m.apart) continue;
-        order = sdf::order_between(order, UINT64_MAX);
-        auto placed = sdf::place(out, *m.object, m.pose, m.material, order);
+        // A dynamic edit is folded where it stands in the list: far from surfaces, later blends lead its values on.
+        uint64_t place = list.edits[edits[m.slots.front()].row].order;
+        if (m.body != Mover::kNoBody) place = order = sdf::order_between(order, UINT64_MAX);
+        auto placed = sdf::place(out, *m.object, m.pose, m.material, place);
         if (!placed) {
             // The list has moved its samples since.
             const std::shared_ptr<const field::BrickSet> baked = m.bricks;
-            if (compile_mover(m)) placed = sdf::place(out, *m.object, m.pose, m.material, order);
+            if (compile_mover(m)) placed = sdf::place(out, *m.object, m.pose, m.material, place);
             m.bricks = baked;
         }
         KILN_ASSERT(bool(placed), "{}", placed ? "" : placed.error().message);
@@ -295,11 +297,31 @@ Result<void> World::Impl::instances_of(float field_voxel, field::DistanceFormat 
             }
             m.bricks_for = field_voxel;
         }
+        m.drawn_as = uint32_t(out.size());
         out.push_back({.bricks = m.bricks, .pose = m.pose, .before = m.before, .material = m.material});
         if (shows) m.before = m.pose;
     }
     std::erase_if(brick_sets, [](const auto& known) { return known.second.expired(); });
     return {};
+}
+
+// After instances_of().
+void World::Impl::outlines_of(Frame& out) {
+    if (edits.outlined() == 0) return;
+    const std::lock_guard lock(mutex);
+    edits.each([&](uint32_t slot) {
+        const Edit& e = *edits[slot].edit;
+        if (!e.outline || e.hidden) return;
+        const auto at = mover_of.find(slot);
+        if (at == mover_of.end() || !movers.at(at->second).apart) {
+            out.outlines.push_back({edits[slot].row, *e.outline});
+            return;
+        }
+        // Rows of an object are in the order of its edits, whichever mover its bricks were made for.
+        const Mover& m = movers.at(at->second);
+        const auto row = std::find(m.slots.begin(), m.slots.end(), slot) - m.slots.begin();
+        out.outlines.push_back({uint32_t(row), *e.outline, m.drawn_as});
+    });
 }
 
 Result<void> World::move(EditId id, const Pose& pose) {

@@ -256,7 +256,7 @@ uint64_t ListCuller::balls_unchanged_by(const Fold& fold, std::span<const uint32
 uint64_t ListCuller::balls_with(const Fold& fold, std::span<const uint32_t> rows) const {
     uint64_t out = 0;
     for (size_t i = 0; i < fold.list.count; ++i) {
-        if (std::find(rows.begin(), rows.end(), entries_[fold.list.first + i].row) == rows.end()) continue;
+        if (!std::binary_search(rows.begin(), rows.end(), entries_[fold.list.first + i].row)) continue;
         out |= fold.joined[i] | fold.won[i] | fold.shown[i];
     }
     return out;

@@ -210,6 +210,56 @@ TEST(InstancePicturesGpu, MovingBakesNothingAndWhatIsBehindIsSeenAgain) {
     EXPECT_EQ(back->srgb, first->srgb);
 }
 
+// A thousand things that stand apart cost rays what they cost as edits of the world: neither the ground behind them nor they behind a hill
+// are looked at.
+TEST(InstancePicturesGpu, AThousandCostRaysNoMoreThanTheSameSurfacesInTheWorld) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP();
+    field::worlds::World ground;
+    ground.options.voxel_size = 0.03f;
+    ground.options.bounds = {{-4, -0.5f, -4}, {4, 1.5f, 4}};
+    ground.edits = {edit(Plane{})};
+    for (int i = 0; i < 9; ++i)
+        ground.edits.push_back(
+            edit(Ellipsoid{.radii = {0.5f, 0.4f, 0.9f}}, {-3.2f + 0.8f * float(i), 0, i % 2 == 0 ? 0.6f : -0.8f}));
+    const Edit kinds[] = {edit(Sphere{.radius = 0.09f}), edit(Box{.half_extents = {0.1f, 0.06f, 0.08f}}),
+                          edit(Torus{.major_radius = 0.08f, .minor_radius = 0.03f})};
+    std::vector<std::shared_ptr<const BrickSet>> sets;
+    for (const Edit& kind : kinds) {
+        // As finely as the world: what differs then is how rays find them.
+        auto made = BrickSet::make(field::worlds::compiled({kind}), ground.options.voxel_size);
+        ASSERT_TRUE(made);
+        sets.push_back(*made);
+    }
+    for (const bool high : {false, true}) {
+        Frame moving = frame_of(ground, high ? vec3{0, 5, 4.5f} : vec3{0.3f, 0.7f, 3.9f});
+        moving.camera.target = {0, 0.2f, 0};
+        field::worlds::World all = ground;
+        Random r(11);
+        for (int i = 0; i < 1000; ++i) {
+            const Pose pose{{r.in(-3.8f, 3.8f), r.in(0.05f, 0.8f), r.in(-3.8f, 3.8f)},
+                            axis_angle(r.direction(), r.in(-3, 3))};
+            moving.instances.push_back({.bricks = sets[size_t(i % 3)], .pose = pose, .before = pose});
+            all.edits.push_back(at(kinds[i % 3], pose));
+        }
+        Frame still = frame_of(all);
+        still.camera = moving.camera;
+        const RenderSettings settings{.width = 150, .height = 90, .view = View::Depth, .refine = false};
+        auto a = renderer->render(still, settings);
+        ASSERT_TRUE(a) << a.error().message;
+        const double evaluations = double(renderer->stats().evaluations);
+        auto b = renderer->render(moving, settings);
+        ASSERT_TRUE(b) << b.error().message;
+        const double ratio = double(renderer->stats().evaluations) / evaluations;
+        EXPECT_LE(ratio, 1.3) << (high ? "from above" : "from the ground");
+        EXPECT_GE(ratio, 0.5);
+        int off = 0;
+        for (size_t i = 0; i < a->depth.size(); ++i)
+            off += std::isinf(a->depth[i]) != std::isinf(b->depth[i]) || std::fabs(a->depth[i] - b->depth[i]) > 0.05f;
+        EXPECT_LE(off, int(a->depth.size()) / 16) << "the same surfaces, but for silhouettes";
+    }
+}
+
 TEST(InstancePicturesGpu, TheExactPathDrawsTheSameAndIsTheHardUnionOfMovedPrograms) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP();
@@ -279,8 +329,8 @@ TEST_F(InstancesGpu, RefinedPointsAreTheSameOnHostAndDevice) {
     in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
     in.size = {96, 72};
     in.use_of_bricks = gpu.use(false);
-    Visibility seen = march(g, in);
-    march_instances(g, in, seen);
+    in.has_instances = true;
+    const Visibility seen = march(g, in);
     Image refined = refine(g, in, seen.words);
     refine_instances(g, in, seen.words, refined);
     const Readback words = g.readback(seen.words), kernel = g.readback(refined);
@@ -400,8 +450,8 @@ TEST_F(InstancesGpu, MotionIsWhereTheSurfaceWasOnTheScreen) {
     in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
     in.size = {64, 48};
     in.motion = g.block(motion_params(frame.camera, frame.camera, 64, 48));
-    Visibility seen = march(g, in);
-    march_instances(g, in, seen);
+    in.has_instances = true;
+    const Visibility seen = march(g, in);
     const Readback words = g.readback(seen.words), moved = g.readback(motion(g, in, seen.words));
     rhi::must(runner_->execute(g));
     const auto visible = rhi::must(words.get_as<uint32_t>());

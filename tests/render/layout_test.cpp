@@ -60,9 +60,10 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);
     EXPECT_EQ(AT(FrameParams, material_count), AT(FrameParams, view) + 4);
-    for (const Kernel* kernel : {&kMarch, &kMarchLevels, &kMarchExact, &kRefine, &kResolve, &kResolveExact,
-                                 &kResolveLevels, &kShadow, &kShadowExact, &kShadowLevels, &kLight, &kView,
-                                 &kMarchInstances, &kRefineInstances, &kResolveInstances, &kShadowInstances}) {
+    for (const Kernel* kernel :
+         {&kMarch, &kMarchLevels, &kMarchExact, &kRefine, &kResolve, &kResolveExact, &kResolveLevels, &kShadow,
+          &kShadowExact, &kShadowLevels, &kLight, &kView, &kMarchInstances, &kMarchLevelsInstances, &kRefineInstances,
+          &kResolveInstances, &kShadowInstances}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, 0);
         ASSERT_TRUE(b) << kernel->name;
@@ -75,7 +76,8 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
 TEST(Layout, LevelsAreTheSame) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
-    for (const auto& [kernel, number] : {std::pair{&kMarchLevels, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
+    for (const auto& [kernel, number] :
+         {std::pair{&kMarchLevels, 7u}, {&kMarchLevelsInstances, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, number);
         ASSERT_TRUE(b) << kernel->name;
@@ -107,17 +109,17 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     std::vector<uint32_t> set;
     for (uint32_t i = 0; i < 16; ++i) set.push_back(i * 4);
     EXPECT_EQ(AT(InstanceSet, samples_first), 52u);
-    expect_array(kMarchInstances, 2, set, sizeof(InstanceSet));
+    expect_array(kMarchInstances, 8, set, sizeof(InstanceSet));
     std::vector<uint32_t> instance;
     for (uint32_t i = 0; i < 6; ++i) instance.push_back(i * 16);
     for (uint32_t i = 0; i < 8; ++i) instance.push_back(AT(InstanceRecord, eye_x) + i * 4);
     EXPECT_EQ(AT(InstanceRecord, before_x), 48u);
     EXPECT_EQ(AT(InstanceRecord, material), 116u);
-    expect_array(kMarchInstances, 1, instance, sizeof(InstanceRecord));
+    expect_array(kMarchInstances, 7, instance, sizeof(InstanceRecord));
     std::vector<uint32_t> node;
     for (uint32_t i = 0; i < 8; ++i) node.push_back(i * 4);
     EXPECT_EQ(AT(InstanceNode, skip), 12u);
-    expect_array(kMarchInstances, 3, node, sizeof(InstanceNode));
+    expect_array(kMarchInstances, 9, node, sizeof(InstanceNode));
     expect_array(kShadow, 3, light, sizeof(LightRecord));
     expect_array(kLight, 2, light, sizeof(LightRecord));
     expect_array(kCluster, 2, light, sizeof(LightRecord));
@@ -132,7 +134,7 @@ TEST(Layout, PushDataIsTheSame) {
                                          AT(BakePush, params_first), AT(BakePush, atlas_bricks_x_y)}))
             << kernel->name;
     }
-    for (const Kernel* kernel : {&kMarchInstances, &kShadowInstances})
+    for (const Kernel* kernel : {&kMarchInstances, &kMarchLevelsInstances, &kShadowInstances})
         EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(InstancePush)) << kernel->name;
     for (const Kernel* kernel : {&kShadow, &kShadowExact, &kLight}) {
         EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(ShadowPush)) << kernel->name;
@@ -140,12 +142,33 @@ TEST(Layout, PushDataIsTheSame) {
 }
 
 TEST(Layout, EveryKernelFitsTheFloor) {
-    for (const Kernel* kernel :
-         {&kBakeHalf,       &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8, &kMarch,           &kMarchExact,
-          &kRefine,         &kResolve,    &kResolveExact, &kShadow,         &kShadowExact,     &kShadowLevelsExact,
-          &kCluster,        &kMotion,     &kTaa,          &kOutlineMask,    &kOutlineFlood,    &kOutlineDraw,
-          &kLight,          &kTonemap,    &kView,         &kMarchInstances, &kRefineInstances, &kResolveInstances,
-          &kShadowInstances}) {
+    for (const Kernel* kernel : {&kBakeHalf,
+                                 &kBakeSnorm8,
+                                 &kBakeCopyHalf,
+                                 &kBakeCopySnorm8,
+                                 &kMarch,
+                                 &kMarchExact,
+                                 &kRefine,
+                                 &kResolve,
+                                 &kResolveExact,
+                                 &kShadow,
+                                 &kShadowExact,
+                                 &kShadowLevelsExact,
+                                 &kCluster,
+                                 &kMotion,
+                                 &kTaa,
+                                 &kOutlineMask,
+                                 &kOutlineFlood,
+                                 &kOutlineDraw,
+                                 &kLight,
+                                 &kTonemap,
+                                 &kView,
+                                 &kMarchInstances,
+                                 &kRefineInstances,
+                                 &kResolveInstances,
+                                 &kMarchLevels,
+                                 &kMarchLevelsInstances,
+                                 &kShadowInstances}) {
         rhi::Caps caps;
         caps.storage_r16f = kernel == &kBakeHalf || kernel == &kBakeSnorm8;
         for (const std::string& sentence : rhi::check_floor(reflected(*kernel), caps))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Outlines: lines of constant width against the exact distance to what they surround, and whose a point is against both operands.
 #include "gpu_worlds.h"
+#include "field/brick_set.h"
 #include "render/lib/color.gpu.h"
 #include "render/lib/pack.h"
 #include "render/passes/outline.gpu.h"
@@ -151,7 +152,7 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
         Frame frame = frame_of(world, {0.3f, 0.8f, 2.5f});
         const sdf::Program& program = frame.field->program();
         const std::vector<EditOutline> outlined{{program.rows()[1], Outline{}}};
-        const OutlineCode code = outline_code(outlined, program);
+        const OutlineCode code = outline_code(outlined, program, {});
         ASSERT_EQ(code.records.size(), 1u);
         GpuField gpu(*runner_);
         rhi::must(gpu.update(frame.field, Baker::Host));
@@ -228,6 +229,53 @@ TEST_F(OutlineGpu, AreTheSameFromEveryDistance) {
         EXPECT_GT(radius, 3);
         EXPECT_NEAR(std::sqrt((area + changed) / std::numbers::pi) - radius, 4, 0.25) << far;
     }
+}
+
+// One outlined box among others, as an edit of the field and as part of an instance that was moved there.
+TEST_F(OutlineGpu, FollowWhatIsDrawnAsAnInstance) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP() << "no Vulkan device";
+    const Pose pose{{0.4f, 0.1f, 0.3f}, axis_angle(normalize(vec3{1, 2, 0.5f}), 0.8f)};
+    const auto at = [](Edit e, const Pose& to) {
+        const vec3 p = e.node.transform.position;
+        e.node.transform.position = to * p;
+        e.node.transform.rotation = to.rotation;
+        return e;
+    };
+    const Edit ball = field::worlds::edit(Sphere{.radius = 0.3f});
+    const Edit box = field::worlds::edit(Box{.half_extents = {0.3f, 0.12f, 0.15f}}, {0.35f, 0, 0});
+    field::worlds::World ground{"ground",
+                                {field::worlds::edit(Box{.half_extents = {1, 0.1f, 1}}, {0, -0.6f, 0})},
+                                {.voxel_size = 0.02f, .bounds = {{-1.2f, -1, -1.2f}, {1.2f, 1, 1.2f}}}};
+    field::worlds::World all = ground;
+    all.edits.push_back(at(ball, pose));
+    all.edits.push_back(at(box, pose));
+    const vec3 eye{0.6f, 1.2f, 2.6f};
+    Frame of_edits = frame_of(all, eye), of_instances = frame_of(ground, eye);
+    auto other = field::BrickSet::make(field::worlds::compiled({ball}), 0.02f);
+    auto both = field::BrickSet::make(field::worlds::compiled({ball, box}), 0.02f);
+    ASSERT_TRUE(other && both);
+    const Pose aside{{-0.6f, -0.1f, 0}, {}};
+    of_instances.instances = {{.bricks = *other, .pose = aside, .before = aside},
+                              {.bricks = *both, .pose = pose, .before = aside}};
+    all.edits.push_back(at(ball, aside));
+    of_edits.field = all.field();
+    const Outline line{.color = {1, 0, 0}, .width_px = 4};
+    of_edits.outlines = {{of_edits.field->program().rows()[2], line}};
+    of_instances.outlines = {{1, line, 1}};
+    const auto lined = [&](const Frame& frame) {
+        const Picture p = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        std::vector<bool> red;
+        for (size_t i = 0; i < p.depth.size(); ++i)
+            red.push_back(p.srgb[4 * i] > 200 && p.srgb[4 * i + 1] < 60 && p.srgb[4 * i + 2] < 60);
+        return red;
+    };
+    const std::vector<bool> a = lined(of_edits), b = lined(of_instances);
+    const auto count = std::count(a.begin(), a.end(), true);
+    int apart = 0;
+    for (size_t i = 0; i < a.size(); ++i) apart += a[i] != b[i];
+    EXPECT_GT(count, 150);
+    EXPECT_LE(apart, count / 8) << "of " << count;
 }
 
 }  // namespace

@@ -77,6 +77,46 @@ TEST_F(RefineGpu, PointsLieOnTheSurfaceAndHostAndDeviceAgree) {
     }
 }
 
+// Sand that dives into water: a point of the shore has the normal of what it is made of, however near the other is.
+TEST_F(RefineGpu, WhereMaterialsMeetEachKeepsItsNormal) {
+    field::worlds::World shore;
+    shore.options.voxel_size = 0.05f;
+    shore.options.bounds = {{-1.5f, -0.5f, -1.5f}, {1.5f, 1, 1.5f}};
+    shore.edits = {field::worlds::of_material(field::worlds::edit(Ellipsoid{.radii = {1.2f, 0.5f, 0.7f}}), 3),
+                   field::worlds::of_material(field::worlds::edit(Plane{}, {0, 0.05f, 0}), 2)};
+    const auto f = shore.field();
+    GpuField gpu(*runner_);
+    rhi::must(gpu.update(f, Baker::Host));
+    Frame frame = frame_of(shore, {0.4f, 1.2f, 2.6f});
+    frame.camera.target = {0, 0.05f, 0.67f};
+    frame.camera.fov_y_deg = 4;  // the shore alone
+    FrameParams p = rhi::must(frame_params(frame, {.width = 96, .height = 96, .accelerate = true}, gpu));
+    const Words words = refined(gpu, p);
+    const float h = p.grid.voxel_size;
+    for (const auto* refined : {&words.by_host, &words.by_kernel}) {
+        int water = 0, sand = 0, near = 0;
+        for (size_t i = 0; i + 3 < words.seen.size(); i += 4) {
+            const uint32_t* const word = &(*refined)[i];
+            if (words.seen[i + 1] >> 28 != kSeenBrick || word[0] == kNotRefined) continue;
+            const vec3 n = shade::unpack_unit(word[1]);
+            const vec3 d = shade::camera_direction_at(p.camera, float(i / 4 % 96) + 0.5f, float(i / 4 / 96) + 0.5f);
+            const vec3 at =
+                vec3{p.camera.eye.x, p.camera.eye.y, p.camera.eye.z} + d * (std::bit_cast<float>(word[0]) * h);
+            const bool is_water = (word[2] & 0xffffu) == sdf::material_number(shore.edits[1].node.material);
+            // Of the ellipsoid x²/a² + y²/b² + z²/c² = 1.
+            const vec3 g{at.x / (1.2f * 1.2f), at.y / 0.25f, at.z / 0.49f};
+            const vec3 expected = is_water ? vec3{0, 1, 0} : normalize(g);
+            ASSERT_GT(dot(n, expected), 0.999f) << (is_water ? "water" : "sand") << " at " << at.x << " " << at.y << " "
+                                                << at.z << " has " << n.x << " " << n.y << " " << n.z;
+            ++(is_water ? water : sand);
+            near += std::fabs(at.y - 0.05f) < 0.1f * h && std::fabs(dot(g, at) - 1) < 0.3f * h;
+        }
+        EXPECT_GT(water, 500);
+        EXPECT_GT(sand, 500);
+        EXPECT_GT(near, 50) << "nothing at the crease";
+    }
+}
+
 TEST(Refine, StepsEndOnPlanesAndCreasesSeenAtAnyAngle) {
     // Distance along a ray to a plane, and to the corner of two of them.
     for (const float slope : {-1.0f, -0.5f, -0.1f, -0.03f}) {

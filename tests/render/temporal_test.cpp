@@ -3,9 +3,12 @@
 #include "gpu_worlds.h"
 #include "image/metrics.h"
 #include "render/lib/color.gpu.h"
+#include "render/edit_motion.h"
 #include "render/lib/pack.h"
+#include "render/picture.h"
 #include "render/temporal.h"
 
+#include <bit>
 #include <cmath>
 
 namespace kiln::render {
@@ -109,6 +112,84 @@ TEST_F(MotionGpu, IsTheReprojectionOfAWorldThatStandsStill) {
     EXPECT_GT(hits, 1000);
     EXPECT_GT(sky, 100);
     EXPECT_GT(largest, 2);
+}
+
+// Two balls that blend; one of them has moved, turned and grown. Its points come from where its own transform had them, to the middle of
+// the blend, and the other's have not moved. In a box that has changed nothing was anywhere.
+TEST_F(MotionGpu, OfWhatBlendsIsThatOfTheNearestEdit) {
+    const vec3 a{-0.25f, 0, 0};
+    const Transform now{{0.3f, 0.1f, 0.1f}, axis_angle({0, 0, 1}, 0.3f), {1, 1, 1}};
+    const Transform before{{0.24f, 0.13f, 0.07f}, axis_angle({0, 0, 1}, 0.2f), {0.9f, 0.9f, 0.9f}};
+    field::worlds::World world{
+        "two balls",
+        {field::worlds::edit(Sphere{.radius = 0.45f}, a), field::worlds::edit(Sphere{.radius = 0.4f})},
+        {.voxel_size = 0.03f, .bounds = {{-1, -1, -1}, {1, 1, 1}}}};
+    world.edits[1].blend_radius = 0.2f;
+    world.edits[1].node.transform = now;
+    Frame frame = frame_of(world, {0.3f, 0.8f, 2.5f});
+    frame.moved = {{frame.field->program().rows()[1], now, before}};
+    for (const bool changed : {false, true}) {
+        if (changed) frame.changed = {{{-1, 0.1f, -1}, {0, 1, 1}}};
+        GpuField gpu(*runner_);
+        rhi::must(gpu.update(frame.field, Baker::Host));
+        const FrameParams p =
+            rhi::must(frame_params(frame, {.width = kWidth, .height = kHeight, .refine = false}, gpu));
+        const MovedEdits moved = moved_edits(frame, frame.field->program(), p);
+        ASSERT_EQ(moved.records.size(), 1u);
+        Graph g(*runner_);
+        TileInputs in;
+        in.field = gpu.import(g);
+        in.frame = g.block(p);
+        const FrameRay no_ray{};
+        in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
+        in.size = {kWidth, kHeight};
+        MotionParams params = motion_params(frame.camera, frame.camera, kWidth, kHeight);
+        params.moved_count = 1;
+        params.changed_count = uint32_t(moved.boxes.size());
+        in.motion = g.block(params);
+        in.moved.owners = {g.upload("moved edits", std::span<const OutlineRecord>(moved.code.records)),
+                           g.upload("code of moved edits", std::span<const sdf::Instruction>(moved.code.code)), 1,
+                           tape_use(moved.code.code)};
+        in.moved.edits = g.upload("motions of edits", std::span<const MovedRecord>(moved.records));
+        in.moved.has_boxes = changed;
+        if (changed) in.moved.boxes = g.upload("changed boxes", std::span<const ChangedBox>(moved.boxes));
+        const Visibility seen = march(g, in);
+        const Readback words = g.readback(seen.words), read = g.readback(motion(g, in, seen.words));
+        rhi::must(runner_->execute(g));
+        const auto visible = rhi::must(words.get_as<uint32_t>());
+        const auto halves = rhi::must(read.get_as<uint16_t>());
+        int ours = 0, theirs = 0, nowhere = 0;
+        for (size_t i = 0; i < visible.size(); i += 4) {
+            if (visible[i + 1] >> 28 == kSeenNothing) continue;
+            const int x = int(i / 4) % kWidth, y = int(i / 4) / kWidth;
+            const vec3 d = shade::camera_direction_at(p.camera, float(x) + 0.5f, float(y) + 0.5f);
+            const vec3 to = d * (std::bit_cast<float>(visible[i]) * p.grid.voxel_size);
+            const vec3 at = frame.camera.position + to;
+            const double mx = double(float_from_half(halves[i])), my = double(float_from_half(halves[i + 1]));
+            if (changed && at.x < -0.01f && at.y > 0.11f) {
+                EXPECT_GT(std::fabs(mx), 1e4);
+                ++nowhere;
+                continue;
+            }
+            const float to_a = length(at - a) - 0.45f, to_b = length(at - now.position) - 0.4f;
+            if (std::fabs(to_a - to_b) < 0.045f || (changed && at.x < 0.01f && at.y > 0.09f)) continue;
+            if (to_a < to_b) {
+                EXPECT_EQ(std::hypot(mx, my), 0) << "it stood still";
+                ++theirs;
+                continue;
+            }
+            ++ours;
+            const vec3 local = rotate(conjugate(now.rotation), at - now.position);
+            const vec3 was = before.position + rotate(before.rotation, local * 0.9f);
+            const vec2 from = shade::camera_pixel(p.camera, was - frame.camera.position);
+            const vec2 is = shade::camera_pixel(p.camera, to);
+            EXPECT_NEAR(mx, double(from.x - is.x), 0.01 + std::fabs(mx) / 512) << x << ", " << y;
+            EXPECT_NEAR(my, double(from.y - is.y), 0.01 + std::fabs(my) / 512) << x << ", " << y;
+        }
+        EXPECT_GT(ours, 200);
+        EXPECT_GT(theirs, 100);
+        EXPECT_EQ(nowhere > 50, changed);
+    }
 }
 
 struct TaaGpu : testing::Test {

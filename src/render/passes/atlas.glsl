@@ -3,6 +3,9 @@
 // (palettes and solid masks);
 // for KILN_FIELD_SURFACE also utexture3D materials (two texels a word, along x).
 
+#ifndef KILN_ATLAS_GLSL
+#define KILN_ATLAS_GLSL
+
 // Texel (0, 0, 0) of a slot in the atlas.
 ivec3 atlas_corner(int slot) {
     int bricks_x = int(frame.grid.atlas_bricks_x_y & 0xffffu);
@@ -38,4 +41,6 @@ uint brick_material(int slot, ivec3 texel) {
     uint two = texelFetch(materials, ivec3(at.x >> 1, at.y, at.z), 0).r;
     return (at.x & 1) == 0 ? two & 0xffffu : two >> 16u;
 }
+#endif
+
 #endif

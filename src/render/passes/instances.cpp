@@ -1,41 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "render/passes/instances.h"
 
-#include "shaders/march_instances.spv.h"
 #include "shaders/refine_instances.spv.h"
 #include "shaders/resolve_instances.spv.h"
 #include "shaders/shadow_instances.spv.h"
 
 namespace kiln::render {
 
-const Kernel kMarchInstances{"march instances", kMarchInstancesSpv};
 const Kernel kRefineInstances{"refine instances", kRefineInstancesSpv};
 const Kernel kResolveInstances{"resolve instances", kResolveInstancesSpv};
 const Kernel kShadowInstances{"shadow instances", kShadowInstancesSpv};
-
-namespace {
-
-InstancePush push_of(const InstanceHandles& instances, uint32_t first_light = 0) {
-    return {.node_count = instances.node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0};
-}
-
-}  // namespace
-
-void march_instances(Graph& g, const TileInputs& in, Visibility& seen) {
-    const InstanceHandles& i = in.instances;
-    if (!i) return;
-    const uint32_t groups =
-        ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
-    Image words = g.create("visibility with instances", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-    Buffer counted = g.create_buffer("march instances evaluations", uint64_t{groups} * 4);
-    g.dispatch(
-        kMarchInstances, in.size,
-        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
-         g.read(in.field.tables), g.read(in.field.distances), g.read(seen.words), g.write(words), g.write(counted)},
-        push_of(i));
-    seen.evaluations.push_back(counted);
-    seen.words = words;
-}
 
 void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, Image& refined) {
     const InstanceHandles& i = in.instances;
@@ -65,13 +39,12 @@ void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, c
                {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
                 g.read(in.rays), g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances),
                 g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both), g.read(light_masks)},
-               push_of(i, first_light));
+               InstancePush{.node_count = i.node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0});
     fractions = both;
 }
 
 void instance_kernels(const TileInputs& in, bool shaded, std::vector<const Kernel*>& out) {
     if (!in.has_instances) return;
-    out.push_back(&kMarchInstances);
     if (in.refine) out.push_back(&specialised(kRefineInstances, in.use_of_instances));
     out.push_back(&kResolveInstances);
     if (shaded) out.push_back(&kShadowInstances);

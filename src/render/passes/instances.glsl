@@ -41,14 +41,16 @@ vec3 walk_inverse(vec3 direction) {
     return mix(1.0 / direction, far, lessThan(abs(direction), vec3(1e-20)));
 }
 
-// Does the ray meet the box before t_end?
-bool walk_meets(InstanceNode n, vec3 from, vec3 inverse, float t_end) {
+// Where the ray enters the box, if that is before t_end; kFarVoxels where it is not.
+float walk_enters(InstanceNode n, vec3 from, vec3 inverse, float t_end) {
     vec3 a = (vec3(n.low_x, n.low_y, n.low_z) - from) * inverse;
     vec3 b = (vec3(n.high_x, n.high_y, n.high_z) - from) * inverse;
     vec3 low = min(a, b);
     vec3 high = max(a, b);
     float t_in = max(max(low.x, low.y), max(low.z, 0.0));
     float t_out = min(min(high.x, high.y), min(high.z, t_end));
-    return t_in <= t_out;
+    return t_in <= t_out ? t_in : kFarVoxels;
 }
+
+bool walk_meets(InstanceNode n, vec3 from, vec3 inverse, float t_end) { return walk_enters(n, from, inverse, t_end) < kFarVoxels; }
 #endif

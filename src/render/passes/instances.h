@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: MIT
-// Passes of a frame that draw its instances beside the field. Each does nothing where there are none.
+// Passes of a frame that draw its instances beside the field, once march() has found them. Each does nothing where there are none.
 #pragma once
 
 #include "render/passes/passes.h"
 
 namespace kiln::render {
 
-extern const Kernel kMarchInstances, kRefineInstances, kResolveInstances, kShadowInstances;
+extern const Kernel kRefineInstances, kResolveInstances, kShadowInstances;
 
-// Overwrites the words of pixels where an instance is nearest.
-void march_instances(Graph& g, const TileInputs& in, Visibility& seen);
-// Fills refine()'s words in for them.
+// Fills refine()'s words in where they are seen.
 void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, Image& refined);
 // And resolve()'s images.
 void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined, Surface& surface);

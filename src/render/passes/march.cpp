@@ -3,13 +3,22 @@
 
 #include "shaders/march.spv.h"
 #include "shaders/march_exact.spv.h"
+#include "shaders/march_instances.spv.h"
 #include "shaders/march_levels.spv.h"
+#include "shaders/march_levels_instances.spv.h"
 
 namespace kiln::render {
 
 const Kernel kMarch{"march", kMarchSpv};
 const Kernel kMarchLevels{"march levels", kMarchLevelsSpv};
+const Kernel kMarchInstances{"march instances", kMarchInstancesSpv};
+const Kernel kMarchLevelsInstances{"march levels instances", kMarchLevelsInstancesSpv};
 const Kernel kMarchExact{"march exact", kMarchExactSpv};
+
+const Kernel& march_kernel(const TileInputs& in) {
+    if (in.levels) return in.has_instances ? kMarchLevelsInstances : kMarchLevels;
+    return in.has_instances ? kMarchInstances : kMarch;
+}
 
 Visibility march(Graph& g, const TileInputs& in) {
     Visibility out;
@@ -26,7 +35,14 @@ Visibility march(Graph& g, const TileInputs& in) {
         std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays), g.read(f.distances),
                               g.write(words),      g.read(f.tables), g.write(counted)};
         if (in.levels) uses.push_back(g.uniform(in.levels_block));
-        g.dispatch(in.levels ? kMarchLevels : kMarch, in.size, uses);
+        if (in.has_instances) {
+            const InstanceHandles& i = in.instances;
+            uses.insert(uses.end(), {g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells)});
+            g.dispatch(march_kernel(in), in.size, uses,
+                       InstancePush{.node_count = i.node_count, .first_light = 0, .pad_0 = 0, .pad_1 = 0});
+        } else {
+            g.dispatch(march_kernel(in), in.size, uses);
+        }
         out.evaluations.push_back(counted);
     }
     if (in.exact) {

@@ -1,84 +1,9 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// Primary visibility of instances, beside what was found before: the ray goes down their tree, into each object's own voxels, and through
-// its bricks by the march of the world's. The nearest wins; of equals what was before, then the lower number.
+// Primary visibility of the bricks and of instances.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
 #include "render/passes/instances.gpu.h"
-
-layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
-
-layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
-layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Nodes { InstanceNode nodes[]; };
-layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
-layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 7) uniform texture3D distances;
-layout(set = 0, binding = 8) uniform utexture2D seen_before;
-layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D visibility;
-layout(set = 0, binding = 10, std430) writeonly buffer Counters { uint evaluations[]; };  // one a workgroup
-layout(push_constant) uniform Push { InstancePush push; };
-
-#define KILN_INSTANCE_WALK
-#include "render/passes/instances.glsl"
-#include "render/passes/rays.glsl"
-
-shared uint group_evaluations;
-
-void main() {
-    if (gl_LocalInvocationIndex == 0u) group_evaluations = 0u;
-    barrier();
-    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (pixel.x < frame.tile_width && pixel.y < frame.tile_height) {
-        uvec4 seen = texelFetch(seen_before, pixel, 0);
-        TexelRay ray = pixel_ray(pixel);
-        vec3 from = from_eye(ray);
-        vec3 inverse = walk_inverse(ray.direction);
-        bool accelerate = (frame.flags & kFrameAccelerate) != 0u;
-        float nearest = uintBitsToFloat(seen.x);
-        uint nearest_instance = kNoInstance;
-        int voxels = 0;
-        int steps = 0;
-        uint at = 0u;
-        while (at < push.node_count) {
-            // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray
-            // Traversal on GPUs", 2009).
-            uint found = kNoInstance;
-            while (at < push.node_count && found == kNoInstance) {
-                InstanceNode node = nodes[at];
-                steps++;
-                bool meets = walk_meets(node, from, inverse, nearest);
-                at = meets ? at + 1u : node.skip;
-                if (meets) found = node.instance;
-            }
-            if (found == kNoInstance) break;
-            InstanceRecord instance = instances[found];
-            here = sets[instance.set];
-            // A little beyond the nearest, so that of equals the lower number is found.
-            float t_end = nearest < kFarVoxels ? nearest * instance.voxels * 1.000001 : kFarVoxels;
-            MarchHit hit = field_march(here.grid, object_ray(instance, from, ray.direction), 0.0, t_end, accelerate);
-            steps += hit.cells + hit.voxels;
-            voxels += hit.voxels;
-            if (hit.state == kMarchMiss) continue;
-            float t = hit.t / instance.voxels;
-            if (t < nearest || (t == nearest && found < nearest_instance && nearest_instance != kNoInstance)) {
-                nearest = t;
-                nearest_instance = found;
-                bool inside = hit.state != kMarchHit;
-                seen.x = floatBitsToUint(t);
-                seen.y = inside ? kSeenInside << 28u : (kSeenInstance << 28u) | found;
-                seen.z = inside ? 0u : uint(hit.voxel.x | (hit.voxel.y << 3) | (hit.voxel.z << 6)) | (uint(hit.slot) << kInstanceSlotShift);
-            }
-        }
-        seen.w = min((seen.w & 0xffffu) + uint(steps), 65535u) | (min((seen.w >> 16u) + uint(voxels), 65535u) << 16u);
-        imageStore(visibility, pixel, seen);
-        atomicAdd(group_evaluations, uint(voxels));
-    }
-    barrier();
-    if (gl_LocalInvocationIndex == 0u) {
-        evaluations[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] = group_evaluations;
-    }
-}
+#define KILN_INSTANCES
+#include "render/passes/march.glsl"

@@ -5,5 +5,4 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
 #define KILN_LEVELS
-#include "field/levels.gpu.h"
 #include "render/passes/march.glsl"

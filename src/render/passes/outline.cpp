@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "render/passes/outline.gpu.h"
+#include "field/brick_set.h"
 #include "render/passes/passes.h"
 
 #include "shaders/outline_draw.spv.h"
@@ -14,9 +15,12 @@ const Kernel kOutlineMask{"outline mask", kOutlineMaskSpv};
 const Kernel kOutlineFlood{"outline flood", kOutlineFloodSpv};
 const Kernel kOutlineDraw{"outline draw", kOutlineDrawSpv};
 
-OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program) {
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& field,
+                         std::span<const Instance> instances) {
     OutlineCode out;
     for (const EditOutline& o : outlines) {
+        if (o.instance != kNoInstance && o.instance >= instances.size()) continue;
+        const sdf::Program& program = o.instance == kNoInstance ? field : instances[o.instance].bricks->program();
         if (o.row >= program.edits.size()) continue;
         const sdf::EditSpan& row = program.edits[o.row];
         if (row.count == 0) continue;
@@ -39,23 +43,31 @@ OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Progr
         r.code_count = uint32_t(out.code.size()) - first;
         r.blend = 0.25f * row.blend;
         r.paints = row.op == Op::Paint ? 1 : 0;
+        r.instance = o.instance;
         out.records.push_back(r);
+        out.of.push_back(uint32_t(&o - outlines.data()));
         out.widest = std::max(out.widest, o.outline.width_px);
     }
     return out;
 }
 
-OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility) {
+OutlineMask edit_owners(Graph& g, const TileInputs& in, const OwnerHandles& asked, const Image& visibility) {
     OutlineMask out;
     out.owners = g.create("outline owners", {.size = in.size, .format = rhi::Format::R32Uint});
     out.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
-    const OutlinePush push{int(in.size.width), int(in.size.height), 0, in.outline_count};
+    const OutlinePush push{int(in.size.width), int(in.size.height), 0, asked.count};
+    const InstanceHandles& i = in.instances;
     g.dispatch(
-        specialised(kOutlineMask, in.use_of_outlines), in.size,
-        {g.uniform(in.frame), g.read(in.rays), g.read(in.field.code), g.read(in.outline_code), g.read(in.field.numbers),
-         g.read(in.outlines), g.read(visibility), g.write(out.owners), g.write(out.seeds)},
+        specialised(kOutlineMask, asked.use), in.size,
+        {g.uniform(in.frame), g.read(in.rays), g.read(asked.code), g.read(in.field.numbers), g.read(asked.records),
+         g.read(visibility), g.write(out.owners), g.write(out.seeds), g.read(i ? i.instances : in.field.numbers),
+         g.read(i ? i.sets : in.field.numbers), g.read(i ? i.numbers : in.field.numbers)},
         push);
     return out;
+}
+
+OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility) {
+    return edit_owners(g, in, {in.outlines, in.outline_code, in.outline_count, in.use_of_outlines}, visibility);
 }
 
 Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest) {

@@ -19,6 +19,9 @@ struct OutlineRecord {
     uint code_first, code_count;  // the edit alone, as `p_world -> distance in register 0`
     float blend;  // metres: how far from its own surface a blend may have moved what is its; see outline_mask.comp
     uint paints;  // 1: it changes no distance
+    uint
+        instance;  // whose object it is part of: its code then counts from the object's origin; kNoInstance: the field's
+    uint pad_0, pad_1, pad_2;
 };
 
 struct OutlinePush {
@@ -28,6 +31,6 @@ struct OutlinePush {
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(OutlineRecord) == 32 && sizeof(OutlinePush) == 16);
+static_assert(sizeof(OutlineRecord) == 48 && sizeof(OutlinePush) == 16);
 }  // namespace kiln::render
 #endif

@@ -8,6 +8,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
+#include "render/passes/instances.gpu.h"
 #include "render/passes/outline.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
@@ -15,16 +16,26 @@ layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Code { uvec2 code[]; };
-layout(set = 0, binding = 3, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
-layout(set = 0, binding = 4, std430) readonly buffer Numbers { float numbers[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Outlines { OutlineRecord outlines[]; };
-layout(set = 0, binding = 6) uniform utexture2D visibility;
-layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2D owners;
-layout(set = 0, binding = 8, r32ui) writeonly uniform uimage2D seeds;
+layout(set = 0, binding = 3, std430) readonly buffer Numbers { float numbers[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Outlines { OutlineRecord outlines[]; };
+layout(set = 0, binding = 5) uniform utexture2D visibility;
+layout(set = 0, binding = 6, r32ui) writeonly uniform uimage2D owners;
+layout(set = 0, binding = 7, r32ui) writeonly uniform uimage2D seeds;
+layout(set = 0, binding = 8, std430) readonly buffer Instances { InstanceRecord instances[]; };
+layout(set = 0, binding = 9, std430) readonly buffer Sets { InstanceSet sets[]; };
+layout(set = 0, binding = 10, std430) readonly buffer InstanceNumbers { float instance_numbers[]; };
 layout(push_constant) uniform Push { OutlinePush push; };
 
 #include "render/passes/rays.glsl"
-#include "render/passes/tape_buffers.glsl"
+#include "render/passes/instance_rays.glsl"
+
+// Does the code at hand belong to the object of `here`?
+bool of_object = false;
+uvec2 sdf_code(uint at) { return code[at]; }
+float sdf_param(uint at) { return of_object ? instance_numbers[here.params_first + at] : numbers[frame.params_first + at]; }
+float sdf_sample(uint at) { return of_object ? instance_numbers[here.samples_first + at] : numbers[at]; }
+#include "render/passes/tape_use.glsl"
+#include "sdf/tape.glsl"
 
 // Trilinear surfaces are this far from their code's at most, where they are not refined.
 const float kSurfaceVoxels = 0.6;
@@ -35,12 +46,24 @@ void main() {
     uvec4 seen = texelFetch(visibility, pixel, 0);
     uint owner = 0u;
     if ((seen.y >> 28u) != kSeenNothing) {
-        vec3 p_world = seen_point(pixel_ray(pixel), seen);
-        float level = (seen.y >> 28u) == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
-        float near = frame.grid.voxel_size * max(kSurfaceVoxels * level, 0.5 * frame.pixel_angle * uintBitsToFloat(seen.x));
+        TexelRay ray = pixel_ray(pixel);
+        vec3 p = seen_point(ray, seen);
+        float voxels = (seen.y >> 28u) == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
+        uint seen_instance = kNoInstance;
+        if ((seen.y >> 28u) == kSeenInstance) {
+            seen_instance = seen.y & 0x0fffffffu;
+            InstanceRecord instance = instances[seen_instance];
+            here = sets[instance.set];
+            vec3 part = vec3(instance.x.w, instance.y.w, instance.z.w) + into_object(instance, from_eye(ray) + ray.direction * uintBitsToFloat(seen.x)) * instance.voxels;
+            p = (vec3(instance.eye_x, instance.eye_y, instance.eye_z) + part) * here.grid.voxel_size;
+            voxels = 1.0 / instance.voxels;
+        }
+        of_object = seen_instance != kNoInstance;
+        float near = frame.grid.voxel_size * max(kSurfaceVoxels * voxels, 0.5 * frame.pixel_angle * uintBitsToFloat(seen.x));
         for (uint i = 0u; i < push.count; ++i) {
             OutlineRecord r = outlines[i];
-            float d = tape_distance(kFromProgram + r.code_first, r.code_count, p_world);
+            if (r.instance != seen_instance) continue;
+            float d = tape_distance(r.code_first, r.code_count, p);
             bool here = r.paints != 0u ? d <= 0.0 : abs(d) <= max(near, r.blend);
             if (here) owner = i + 1u;
         }

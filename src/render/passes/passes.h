@@ -20,9 +20,9 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResolveExact, kResolveLevels,
-    kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
-    kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
+extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kResolve,
+    kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
+    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
@@ -42,6 +42,19 @@ void store_bricks(Graph& g, FieldHandles& f, std::span<const uint32_t> slots, st
                   std::span<const std::byte> words, uint32_t atlas_bricks_x_y, rhi::Format format);
 
 const Kernel& bake_kernel(rhi::Format format, bool by_copy, const TapeUse& use);
+
+// Edits, each with its own code, whose pixels are asked for.
+struct OwnerHandles {
+    Buffer records, code;  // OutlineRecord
+    uint32_t count = 0;
+    TapeUse use;
+};
+// What of the field moved or changed since the frame before.
+struct MovedHandles {
+    OwnerHandles owners;
+    Buffer edits, boxes;  // MovedRecord of each owner; ChangedBox
+    bool has_boxes = false;
+};
 
 // What every pass of one tile reads.
 struct TileInputs {
@@ -87,6 +100,7 @@ struct TileInputs {
     BoxHandles boxes;          // with `rt`
     bool rt = false;           // the bricks are marched by rays through their boxes
     bool mesh_shader = false;  // clusters of meshes are drawn by a mesh shader
+    MovedHandles moved;  // with taa
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -94,6 +108,8 @@ struct Visibility {
     Image words;
     std::vector<Buffer> evaluations;
 };
+const Kernel& march_kernel(const TileInputs& in);
+// First hits on the field and on instances.
 Visibility march(Graph& g, const TileInputs& in);
 // The words of the bricks, by rays through in.boxes; what it answers counts evaluations.
 Buffer march_boxes(Graph& g, const TileInputs& in, Image& words);
@@ -141,12 +157,15 @@ struct OutlineCode {
     std::vector<OutlineRecord> records;
     std::vector<sdf::Instruction> code;
     float widest = 0;
-    int left_out = 0;  // no code for a GPU
+    int left_out = 0;          // no code for a GPU
+    std::vector<uint32_t> of;  // the outline that each record is
 };
-OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program);
+OutlineCode outline_code(std::span<const EditOutline> outlines, const sdf::Program& program,
+                         std::span<const Instance> instances);
 struct OutlineMask {
     Image owners, seeds;
 };
+OutlineMask edit_owners(Graph& g, const TileInputs& in, const OwnerHandles& asked, const Image& visibility);
 OutlineMask outline_mask(Graph& g, const TileInputs& in, const Image& visibility);
 // Seeds of the pixels that lines reach.
 Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, float widest);

@@ -47,13 +47,16 @@ void main() {
         float step = refine_gradient_step(h, coordinate);
         float enough = refine_enough(h, coordinate);
         vec3 gradient = vec3(0.0);
+        float d_here = 0.0;
+        float d_up = 0.0;
+        bool up_is_other = false;
         Mix mixed = make_mix(0.0, 0.0, 0.0);
         // One call serves the looks for the place, the one at it, and the six around it: every inlined copy costs compile time.
         for (int i = -kRefineSteps; i < 7; ++i) {
             vec3 away = vec3(0.0);
             if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
             Mix here;
-            float d = tape_materials(record.code_first, record.code_count, origin + ray.direction * (t * h) + away, i == 0, here) / h;
+            float d = tape_materials(record.code_first, record.code_count, origin + ray.direction * (t * h) + away, i >= 0, here) / h;
             if (i < 0) {
                 if (abs(d) <= enough) {
                     i = -1;
@@ -66,8 +69,12 @@ void main() {
             } else if (i == 0) {
                 if (!refine_holds(t_first, t, d)) break;
                 mixed = here;
+                d_here = d;
+            } else if ((i & 1) == 1) {
+                d_up = d;
+                up_is_other = here.id0 != mixed.id0;
             } else {
-                gradient[(i - 1) >> 1] += (i & 1) == 1 ? d : -d;
+                gradient[(i - 1) >> 1] = refine_slope(d_up, d, d_here, up_is_other, here.id0 != mixed.id0);
             }
         }
         float steep = length(gradient);

@@ -33,10 +33,10 @@ constexpr size_t kMostAtOnce = 256;  // points of one brick
 // Points of one brick, looked at together.
 struct Batch {
     std::array<float, kMostAtOnce> x, y, z, d;
-    std::array<sdf::MaterialMix, kMostAtOnce> mixes;
+    std::array<sdf::MaterialMix, kMostAtOnce> mixes, mixes_beside;
     std::array<vec3, kMostAtOnce> direction, gradient;
-    std::array<float, kMostAtOnce> t_first, t, t_before, d_before, size;
-    std::array<bool, kMostAtOnce> holds;
+    std::array<float, kMostAtOnce> t_first, t, t_before, d_before, size, d_here, d_up;
+    std::array<bool, kMostAtOnce> holds, up_is_other;
 };
 
 // Looks at the batch's first `count` points until each is where `tape` has the surface, then round it for the gradient. at(k, t): the
@@ -62,8 +62,8 @@ void look_at(Batch& b, size_t count, const sdf::TapeView& tape, float h, At&& at
             }
             b.x[k] = p.x, b.y[k] = p.y, b.z[k] = p.z;
         }
-        if (look == 0) {
-            sdf::evaluate_materials(tape, points, b.d.data(), b.mixes.data());
+        if (look >= 0) {
+            sdf::evaluate_materials(tape, points, b.d.data(), look == 0 ? b.mixes.data() : b.mixes_beside.data());
         } else {
             sdf::evaluate(tape, points, b.d.data());
         }
@@ -79,8 +79,15 @@ void look_at(Batch& b, size_t count, const sdf::TapeView& tape, float h, At&& at
                 b.t[k] = next;
             } else if (look == 0) {
                 b.holds[k] = refine_holds(b.t_first[k], b.t[k], d);
+                b.d_here[k] = d;
+            } else if (look % 2 == 1) {
+                b.d_up[k] = d;
+                b.up_is_other[k] = b.mixes_beside[k].id0 != b.mixes[k].id0;
             } else {
-                (axis == 0 ? b.gradient[k].x : axis == 1 ? b.gradient[k].y : b.gradient[k].z) += side * d;
+                (axis == 0   ? b.gradient[k].x
+                 : axis == 1 ? b.gradient[k].y
+                             : b.gradient[k].z) =
+                    refine_slope(b.d_up[k], d, b.d_here[k], b.up_is_other[k], b.mixes_beside[k].id0 != b.mixes[k].id0);
             }
         }
         if (look < 0 && !searching) look = -1;

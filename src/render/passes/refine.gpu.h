@@ -39,6 +39,14 @@ KILN_FN float refine_gradient_step(float voxel_size, float coordinate) {
     return max(0.1f * voxel_size, 3e-4f * coordinate);
 }
 
+// Slope along an axis, over two steps, from the distances a step up, a step down and at the place. Where materials meet at a crease, one of
+// the samples may lie beyond it: what is heaviest there is another material. The other side alone then says how the surface lies that
+// the place is on; a mean of both would be a sliver of, say, water that stands on end.
+KILN_FN float refine_slope(float up, float down, float here, bool up_is_other, bool down_is_other) {
+    if (up_is_other == down_is_other) return up - down;
+    return 2.0f * (up_is_other ? here - down : up - here);
+}
+
 #ifdef __cplusplus
 }  // namespace kiln::render
 #endif

@@ -52,6 +52,9 @@ void main() {
     float step = refine_gradient_step(h, coordinate);
     float enough = refine_enough(h, coordinate);
     vec3 gradient = vec3(0.0);
+    float d_here = 0.0;
+    float d_up = 0.0;
+    bool up_is_other = false;
     Mix mixed = make_mix(0.0, 0.0, 0.0);
     uvec4 words = uvec4(kNotRefined, 0u, 0u, 0u);
     // As in refine.comp: one call for all looks.
@@ -59,7 +62,7 @@ void main() {
         vec3 away = vec3(0.0);
         if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
         Mix found;
-        float d = tape_materials(record.code_first, record.code_count, brick_point(local, texel, t) * h + away, i == 0, found) / h;
+        float d = tape_materials(record.code_first, record.code_count, brick_point(local, texel, t) * h + away, i >= 0, found) / h;
         if (i < 0) {
             if (abs(d) <= enough) {
                 i = -1;
@@ -72,8 +75,12 @@ void main() {
         } else if (i == 0) {
             if (!refine_holds(t_first, t, d)) break;
             mixed = found;
+            d_here = d;
+        } else if ((i & 1) == 1) {
+            d_up = d;
+            up_is_other = found.id0 != mixed.id0;
         } else {
-            gradient[(i - 1) >> 1] += (i & 1) == 1 ? d : -d;
+            gradient[(i - 1) >> 1] = refine_slope(d_up, d, d_here, up_is_other, found.id0 != mixed.id0);
         }
     }
     float steep = length(gradient);

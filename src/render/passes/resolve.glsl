@@ -94,16 +94,23 @@ void main() {
         float step = refine_gradient_step(h, max(max(size.x, size.y), size.z));
         if (state == kSeenOutside) step = max(step, 0.25 * frame.pixel_angle * t * h);
         vec3 gradient = vec3(0.0);
+        float d_here = 0.0;
+        float d_up = 0.0;
+        bool up_is_other = false;
         Mix mixed = make_mix(0.0, float(kNoMaterial), 0.0);
         for (int i = 0; i < 7; ++i) {
             vec3 away = vec3(0.0);
             if (i > 0) away[(i - 1) >> 1] = (i & 1) == 1 ? step : -step;
             Mix here;
-            float d = tape_materials(here_code.x, here_code.y, p_world + away, i == 0, here);
+            float d = tape_materials(here_code.x, here_code.y, p_world + away, true, here);
             if (i == 0) {
                 mixed = here;
+                d_here = d;
+            } else if ((i & 1) == 1) {
+                d_up = d;
+                up_is_other = here.id0 != mixed.id0;
             } else {
-                gradient[(i - 1) >> 1] += (i & 1) == 1 ? d : -d;
+                gradient[(i - 1) >> 1] = refine_slope(d_up, d, d_here, up_is_other, here.id0 != mixed.id0);
             }
         }
         s.normal = unit_or(gradient, -ray.direction);

@@ -79,7 +79,7 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
         uint found = kNoInstance;
         float radius = 0.0;
         float along = 0.0;
-        // To the next leaf first, as in march_instances.comp.
+        // To the next leaf first, as in march_sets.glsl.
         while (at < push.node_count && found == kNoInstance) {
             InstanceNode node = nodes[at];
             bool meets = walk_meets(node, p, inverse, t_last);

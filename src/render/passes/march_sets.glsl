@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: MIT
+// A primary ray among instances: down their tree, into each object's own voxels, and through its bricks by the march of the world's. The
+// including kernel declares first what instances.glsl asks for with KILN_INSTANCE_WALK, and InstancePush push.
+
+// The bricks of sets, under names of their own beside the world's.
+#define field_cell set_cell
+#define field_corners set_corners
+#define field_voxel_solid set_voxel_solid
+#define field_enter set_enter
+#define voxel_exit_plane set_voxel_exit_plane
+#define march_brick set_march_brick
+#define texel_plane_crossing set_texel_plane_crossing
+#define cell_at set_cell_at
+#define field_march set_march
+#define KILN_INSTANCE_WALK
+#include "render/passes/instances.glsl"
+#undef field_cell
+#undef field_corners
+#undef field_voxel_solid
+#undef field_enter
+#undef voxel_exit_plane
+#undef march_brick
+#undef texel_plane_crossing
+#undef cell_at
+#undef field_march
+
+struct SetHit {
+    float t;        // finest voxels; kFarVoxels: none
+    uint instance;  // kNoInstance: none
+    MarchHit hit;   // in the object's voxels
+    int cells, voxels;
+};
+
+MarchHit no_hit() { return MarchHit(kMarchMiss, kFarVoxels, -1, ivec3(0), ivec3(0), vec3(0.0), 0, 0); }
+
+// Where a ray enters the first box of a leaf, kFarVoxels where it meets none. `looks` counts boxes.
+float first_box_of(vec3 from, vec3 inverse, inout int looks) {
+    float first = kFarVoxels;
+    uint at = 0u;
+    while (at < push.node_count) {
+        InstanceNode node = nodes[at];
+        looks++;
+        float enters = walk_enters(node, from, inverse, first);
+        bool meets = enters < first;
+        at = meets ? at + 1u : node.skip;
+        if (meets && node.instance != kNoInstance) first = enters;
+    }
+    return first;
+}
+
+// The nearest hit of all; of equals the lower number.
+SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, bool accelerate) {
+    SetHit nearest = SetHit(kFarVoxels, kNoInstance, no_hit(), 0, 0);
+    uint at = 0u;
+    while (at < push.node_count) {
+        // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray
+        // Traversal on GPUs", 2009).
+        uint found = kNoInstance;
+        while (at < push.node_count && found == kNoInstance) {
+            InstanceNode node = nodes[at];
+            nearest.cells++;
+            bool meets = walk_meets(node, from, inverse, nearest.t);
+            at = meets ? at + 1u : node.skip;
+            if (meets) found = node.instance;
+        }
+        if (found == kNoInstance) break;
+        InstanceRecord instance = instances[found];
+        here = sets[instance.set];
+        // A little beyond the nearest, so that of equals the lower number is found.
+        float t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 : kFarVoxels;
+        MarchHit hit = set_march(here.grid, object_ray(instance, from, ray.direction), 0.0, t_end, accelerate);
+        nearest.cells += hit.cells;
+        nearest.voxels += hit.voxels;
+        if (hit.state == kMarchMiss) continue;
+        float t = hit.t / instance.voxels;
+        if (t < nearest.t || (t == nearest.t && found < nearest.instance)) {
+            nearest.t = t;
+            nearest.instance = found;
+            nearest.hit = hit;
+        }
+    }
+    return nearest;
+}
