@@ -234,14 +234,15 @@ float BrickField::ask(vec3 p, vec3* gradient, Trail& trail) const {
     if (!at.near) return by(*exact_);
     const uint64_t key = key_of(at.cell);
     if (key != trail.key) trail = {key, find(key, at.cell)};
-    thread_local Brick scratch;
-    const Brick* b = &scratch;
+    const Brick* b = nullptr;
     if (trail.place != nullptr) {
         Slot& slot = *static_cast<Slot*>(const_cast<void*>(trail.place));
         b = slot.brick.load(std::memory_order_acquire);
         if (b == far_cell()) return by(part(slot, at.cell));
-    } else if (!make(at.cell, scratch)) {  // no room: made for this question alone
-        return by(*exact_);
+    } else {  // no room: made for this question alone
+        thread_local Brick scratch;
+        if (!make(at.cell, scratch)) return by(*exact_);
+        b = &scratch;
     }
     const ivec3 v{at.texel.x - at.cell.x * kBrickVoxels, at.texel.y - at.cell.y * kBrickVoxels,
                   at.texel.z - at.cell.z * kBrickVoxels};
