@@ -119,6 +119,7 @@ struct Renderer::Impl {
         in.has_instances = !frame.instances.empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
+        in.mesh_holes = meshes->holes();
         return in;
     }
     void add_times(const FrameTimes& times);

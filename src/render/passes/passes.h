@@ -23,7 +23,7 @@ extern const Kernel kMarch, kMarchLevels, kMarchExact, kRefine, kResolve, kResol
     kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels, kShadowLevelsExact,
     kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
-extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
+extern const Kernel kMeshSee, kMeshResolve, kMeshShadow, kMeshShadowHoles;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
 extern const Kernel kBloomDown, kBloomUp, kBloomBlur, kExposureCount, kExposureAdapt;
 
@@ -81,6 +81,7 @@ struct TileInputs {
     TapeUse use_of_outlines;
     MeshHandles meshes;
     bool has_meshes = false;
+    bool mesh_holes = false;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -112,6 +113,7 @@ void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
 Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Buffer& light_masks,
                     const Image& fractions, const ShadowPush& push);
 
+const Kernel& mesh_shadow_kernel(const TileInputs& in);
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
 // Which lights may reach which tile; see cluster.comp and light_walk.glsl.
