@@ -30,9 +30,7 @@ bool is_closed(std::span<const vec3> positions, std::span<const uint32_t> corner
     }
     std::sort(edges.begin(), edges.end());
     if (std::adjacent_find(edges.begin(), edges.end()) != edges.end()) return false;
-    const auto has_twin = [&](uint64_t e) {
-        return std::binary_search(edges.begin(), edges.end(), e << 32 | e >> 32);
-    };
+    const auto has_twin = [&](uint64_t e) { return std::binary_search(edges.begin(), edges.end(), e << 32 | e >> 32); };
     return !edges.empty() && std::all_of(edges.begin(), edges.end(), has_twin);
 }
 

@@ -51,6 +51,8 @@ Result<std::vector<std::byte>> Readback::get() const {
     return *state_->bytes;
 }
 
+std::string Readback::name() const { return state_ ? state_->name : std::string{}; }
+
 // ---- runner
 
 struct Runner::Impl {

@@ -112,5 +112,26 @@ TEST_F(MeshShadowGpu, BacksOfClosedSurfacesChangeNoMoreThanRounding) {
     EXPECT_NE(picture(bare, true).rgba, both.rgba);
 }
 
+TEST_F(MeshShadowGpu, ALampInAClosedBoxLightsNothingOutsideIt) {
+    Frame frame = crowd();
+    frame.meshes.clear();
+    frame.environment = Environment{.color = {0, 0, 0}};
+    const vec3 middle{0.4f, 0.1f, 0.2f};
+    frame.lights = {{.kind = Light::Kind::Point, .position = middle, .intensity = 5, .radius = 0.05f}};
+    const auto brightest = [&] {
+        const Picture p = picture(frame, true);
+        float most = 0;
+        for (size_t i = 0; i < p.rgba.size(); ++i)
+            if (i % 4 != 3) most = std::max(most, p.rgba[i]);
+        return most;
+    };
+    EXPECT_GT(brightest(), 0.1f);
+    frame.meshes.push_back(meshes::at(box({0.15f, 0.15f, 0.15f}, meshes::matte({0.6f, 0.6f, 0.6f})), middle));
+    for (const float side : {1.0f, -1.0f}) {
+        frame.meshes[0].transform.scale = {side, 1, 1};
+        EXPECT_EQ(brightest(), 0) << side;
+    }
+}
+
 }  // namespace
 }  // namespace kiln::render
