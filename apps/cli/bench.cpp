@@ -19,6 +19,7 @@ namespace {
 struct Options {
     std::vector<std::string> names;
     BenchOptions bench;
+    std::vector<std::string> sizes;
     bool list = false, json = false;
 };
 
@@ -110,8 +111,15 @@ int list(bool json) {
     return finish_data();
 }
 
-int bench(const Options& o) {
+int bench(Options o) {
     if (o.list) return list(o.json);
+    if (!o.sizes.empty()) o.bench.sizes.clear();
+    for (const std::string& size : o.sizes) {
+        int width = 0, height = 0, read = 0;
+        if (std::sscanf(size.c_str(), "%5dx%5d%n", &width, &height, &read) != 2 || size_t(read) != size.size())
+            return fail({"--size " + size + ": not a size; write WIDTHxHEIGHT, such as 480x270", ErrorKind::Usage});
+        o.bench.sizes.emplace_back(width, height);
+    }
     Result<BenchReport> report = [&] {
         Progress progress;
         return run_bench(o.names, o.bench, [&](std::string_view stage, double done) { progress.bar(stage, done); });
@@ -139,6 +147,8 @@ void add_bench(CLI::App& app, Run& run) {
     verb->add_option("--seed", o->bench.seed, "of the scene (default 5)");
     verb->add_option("--runs", o->bench.runs, "a row is the least of so many (default 7)");
     verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)");
+    verb->add_option("--size", o->sizes, "of the pictures of frame, several as 480x270,1920x1080 (default 480x270)")
+        ->delimiter(',');
     verb->add_option("--threads", o->bench.threads, "threads of every row (default: 1, and rows for all cores beside)")
         ->check(CLI::Range(1, 1024));
     verb->callback([o, &run] { run = [o] { return bench(*o); }; });

@@ -20,6 +20,7 @@ namespace {
 constexpr int kPicturesOfOneView = 16;  // with --taa, a round of the renderer's jitter
 
 constexpr std::string_view kTiers[] = {"auto", "compute", "rt", "mesh"};
+constexpr std::string_view kQualities[] = {"low", "medium", "high", "ultra", "auto"};
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
@@ -55,6 +56,18 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
                      (near.empty() ? "use auto, compute, rt or mesh" : "did you mean " + std::string(near) + "?"));
     }
     s.tier = Tier(tier - std::begin(kTiers));
+    if (!o.quality.empty()) {
+        const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality);
+        if (found == std::end(kQualities)) {
+            const std::string_view near = nearest_word(o.quality, kQualities);
+            return usage(
+                "--quality " + o.quality + ": there is no such quality; " +
+                (near.empty() ? "use low, medium, high, ultra or auto" : "did you mean " + std::string(near) + "?"));
+        }
+        if (o.no_refine || o.taa)
+            return usage("--quality decides what --no-refine and --taa do; leave one of them out");
+        if (o.reference > 0) return usage("--quality is for the renderer, not for --reference; leave one of them out");
+    }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
     if (o.reference < 0) return usage("--reference takes a number of samples above 0");
     if (!(o.time >= 0 && o.time <= 1e9)) return usage("--time wants seconds, 0 or more");
@@ -73,6 +86,15 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     s.cull_lights = !o.all_lights;
     s.atlas_by_copy = o.atlas_by_copy;
     return s;
+}
+
+// Sets what --quality asks for; answers its name, "auto" as what it became.
+std::string_view choose_quality(const PictureOptions& o, const Renderer& renderer, RenderSettings& s) {
+    if (o.quality.empty()) return kQualities[size_t(Quality::High)];
+    const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality) - std::begin(kQualities);
+    const Quality quality = o.quality == "auto" ? renderer.best_quality() : Quality(found);
+    set_quality(s, quality);
+    return kQualities[size_t(quality)];
 }
 
 Result<void> check_output(const std::string& path) {
@@ -119,19 +141,29 @@ std::string levels_json(const RenderStats& stats) {
     return "[" + out + "]";
 }
 
-std::string report(const PictureOptions& o, const RenderSettings& s, const RenderStats& stats, const Frame& frame,
-                   const World& world, double load, double total) {
-    std::string passes;
-    for (const auto& [name, ms] : stats.passes)
-        passes += (passes.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(ms);
+// {"name": number, …}
+template <typename Number>
+std::string named_numbers(const std::vector<std::pair<std::string, Number>>& list) {
+    std::string out;
+    for (const auto& [name, value] : list)
+        out += (out.empty() ? "" : ", ") + Json::quoted(name) + ": " + Json::digits(double(value));
+    return "{" + out + "}";
+}
+
+std::string report(const PictureOptions& o, std::string_view quality, const RenderSettings& s, const RenderStats& stats,
+                   const Frame& frame, const World& world, double load, double total) {
     Json json;
     json.text("device", stats.device)
         .raw("size", "[" + std::to_string(s.width) + ", " + std::to_string(s.height) + "]");
-    json.text("view", o.view).text("output", o.output);
+    json.text("view", o.view).text("quality", quality).text("output", o.output);
     json.number("edits", stats.edits)
         .number("bricks", stats.bricks)
         .number("frame_ms", stats.frame_ms)
-        .raw("passes", "{" + passes + "}");
+        .raw("passes", named_numbers(stats.passes))
+        .raw("pass_bytes", named_numbers(stats.pass_bytes))
+        .raw("pass_evaluations", named_numbers(stats.pass_evaluations))
+        .number("transient_peak_bytes", double(stats.transient_peak_bytes))
+        .number("transient_sum_bytes", double(stats.transient_sum_bytes));
     json.number("evaluations", double(stats.evaluations)).number("atlas_bytes", double(stats.atlas_bytes));
     json.number("host_bytes", double(stats.host_bytes)).number("pipelines_created", double(stats.pipelines_created));
     json.number("exposure", double(stats.exposure))
@@ -208,11 +240,12 @@ std::string numbered(const std::string& output, int frame) {
 }
 
 // A picture a frame, the levels of the world following the camera.
-int render_sequence(const PictureOptions& o, const RenderSettings& settings, const World& world, Progress& progress) {
+int render_sequence(const PictureOptions& o, RenderSettings settings, const World& world, Progress& progress) {
     const auto stops = stops_of(world, o.path);
     if (!stops) return progress.stage(""), fail(stops.error());
     auto renderer = Renderer::create({.device = o.device});
     if (!renderer) return progress.stage(""), fail(renderer.error());
+    (void)choose_quality(o, *renderer, settings);
     const FrameBudget budget = o.budget != 0 ? FrameBudget{.bricks = o.budget} : FrameBudget{};
     std::string rows;
     double worst_ms = 0;
@@ -252,7 +285,7 @@ int render_sequence(const PictureOptions& o, const RenderSettings& settings, con
 }  // namespace
 
 int render_picture(const PictureOptions& o) {
-    const auto settings = settings_of(o);
+    auto settings = settings_of(o);
     if (!settings) return fail(settings.error());
     if (auto ok = check_output(o.output); !ok) return fail(ok.error());
 
@@ -270,6 +303,7 @@ int render_picture(const PictureOptions& o) {
 
     Result<Picture> picture = Error{};
     RenderStats stats;
+    std::string_view quality = "reference";
     if (o.reference > 0) {
         progress.stage("tracing paths");
         picture = render_reference(*frame, *settings, o.reference, &stats);
@@ -277,9 +311,11 @@ int render_picture(const PictureOptions& o) {
         progress.stage("starting the device");
         auto renderer = Renderer::create({.device = o.device});
         if (!renderer) return progress.stage(""), fail(renderer.error());
+        quality = choose_quality(o, *renderer, *settings);
         progress.stage("drawing");
         picture = renderer->render(*frame, *settings);
-        for (int i = 1; picture && o.taa && i < kPicturesOfOneView; ++i) picture = renderer->render(*frame, *settings);
+        for (int i = 1; picture && settings->taa && i < kPicturesOfOneView; ++i)
+            picture = renderer->render(*frame, *settings);
         stats = renderer->stats();
     }
     if (!picture) return progress.stage(""), fail(picture.error());
@@ -306,7 +342,7 @@ int render_picture(const PictureOptions& o) {
             say("next     kiln render " + o.scene + " -o " + o.scene + ".exr   ·   kiln demo --list   ·   kiln doctor");
     }
     if (!o.json) return kDone;
-    (void)put(report(o, *settings, stats, *frame, *world, load, total.seconds()));
+    (void)put(report(o, quality, *settings, stats, *frame, *world, load, total.seconds()));
     return finish_data();
 }
 

@@ -19,6 +19,7 @@ struct PictureOptions {
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
          atlas_by_copy = false;
     bool taa = false;
+    std::string quality;  ///< low, medium, high, ultra or auto; empty: high
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };

@@ -45,6 +45,8 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");
     verb->add_flag("--taa", o->taa,
                    "anti-alias over time: by the pictures before with --path, else by sixteen of one view");
+    verb->add_option("--quality", o->quality,
+                     "low, medium (hard shadows), high (default), ultra (with --taa), or auto: what suits the device");
     verb->add_flag("--json", o->json, "one object with what it took, on stdout");
     verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
     verb->callback([o, &run] { run = [o] { return render_picture(*o); }; });

@@ -11,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace kiln {
@@ -31,6 +32,7 @@ struct BenchOptions {
     int threads = 0;        ///< 0: one thread, and rows for every core beside; otherwise just that many
     int runs = 7;           ///< a row is the least of so many, taken in turn with its peer's
     int resolution = 256;   ///< voxels along a side of [-1, 1]³
+    std::vector<std::pair<int, int>> sizes{{480, 270}};  ///< of the pictures of `bench frame`, pixels
 };
 
 inline constexpr double kNoBenchValue = std::numeric_limits<double>::quiet_NaN();

@@ -138,7 +138,14 @@ struct RenderSettings {
     bool cut = false;   ///< taa: this picture follows on none before
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
     Tier tier = Tier::Auto;
+    bool soft_shadows = true;  ///< false: lights are points to shadows, whatever their size
 };
+
+/// What a picture may cost. Low: hard shadows, surfaces as the bricks have them. Medium: hard shadows. High: everything that one picture can
+/// show. Ultra: anti-aliased over time too.
+enum class Quality : uint8_t { Low, Medium, High, Ultra };
+/// Sets `refine`, `soft_shadows` and `taa`, no more.
+void set_quality(RenderSettings& settings, Quality quality);
 
 /// Pixels, top row first.
 struct Picture {
@@ -184,6 +191,11 @@ struct RenderStats {
     uint32_t boxes = 0;                  ///< in the tree that rays are traced through
     uint64_t box_tree_builds = 0;        ///< since creation
     uint64_t box_tree_bytes = 0;
+    /// Of each of `passes`: bytes of the frame's own images and buffers that it reads and writes, each texel once.
+    std::vector<std::pair<std::string, uint64_t>> pass_bytes;
+    std::vector<std::pair<std::string, uint64_t>> pass_evaluations;  ///< of those that march
+    uint64_t transient_peak_bytes = 0;  ///< memory of images that live for a part of a frame
+    uint64_t transient_sum_bytes = 0;   ///< … if they did not share it
 };
 
 struct DeviceInfo {
@@ -210,6 +222,8 @@ public:
     Result<Picture> render(const Frame& frame, const RenderSettings& settings = {});
     /// Of the last render().
     const RenderStats& stats() const;
+    /// What suits the device: Medium on a processor, High where graphics are built into one, Ultra on a card.
+    Quality best_quality() const;
 
 private:
     struct Impl;

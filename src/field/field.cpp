@@ -129,7 +129,8 @@ private:
         bool keeps(ivec3 cell, Inserted inserted, sdf::ListCuller::Start start) const {
             if (whole()) return false;
             const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
-            if ((word & kCellOccupied) == 0) return inserted == Inserted::NoEffect &&
+            if ((word & kCellOccupied) == 0)
+                return inserted == Inserted::NoEffect &&
                        std::none_of(gone.begin(), gone.end(), [&](const CellBox& b) { return contains(b, cell); });
             return inserted != Inserted::Shows &&
                    stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);

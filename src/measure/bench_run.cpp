@@ -16,7 +16,8 @@ using namespace measure;
 namespace {
 
 const std::vector<BenchFamily>& families() {
-    static const std::vector<BenchFamily> all{field_family(), world_family(), physics_family(), journal_family()};
+    static const std::vector<BenchFamily> all{field_family(), world_family(), physics_family(), journal_family(),
+                                              frame_family()};
     return all;
 }
 
@@ -52,6 +53,9 @@ std::optional<Error> fault_of(const BenchOptions& o) {
         return usage(formatted("bench: {} runs; between 1 and 10000 are possible", o.runs));
     if (o.resolution < 16 || o.resolution > 1024)
         return usage(formatted("bench: {} voxels a side; between 16 and 1024 are possible", o.resolution));
+    for (const auto& [width, height] : o.sizes)
+        if (width < 1 || height < 1 || width > 16384 || height > 16384)
+            return usage(formatted("bench: pictures of {}x{}; sides of 1 to 16384 are possible", width, height));
     return std::nullopt;
 }
 

@@ -58,6 +58,7 @@ struct BenchFamily {
     void (*run)(BenchRun&);
 };
 BenchFamily field_family();
+BenchFamily frame_family();
 BenchFamily journal_family();
 BenchFamily physics_family();
 BenchFamily world_family();

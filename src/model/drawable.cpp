@@ -2,6 +2,7 @@
 
 #include "model/drawable.h"
 
+#include "model/closed.h"
 #include "model/triangles.h"
 
 #include <algorithm>
@@ -10,6 +11,8 @@ namespace kiln::model {
 
 void finish(Drawable& d) {
     d.bvh.clear();
+    std::vector<vec3> positions;
+    for (const Vertex& v : d.vertices) positions.push_back(v.position);
     for (Primitive& p : d.primitives) {
         const uint32_t triangles = p.index_count / 3;
         std::vector<Box3> boxes(triangles);
@@ -29,6 +32,9 @@ void finish(Drawable& d) {
         const std::vector<uint32_t> old(corners.begin(), corners.end());
         for (uint32_t t = 0; t < triangles; ++t)
             for (uint32_t c = 0; c < 3; ++c) corners[3 * t + c] = old[3 * order[t] + c];
+        std::vector<uint32_t> counted(corners.begin(), corners.end());
+        for (uint32_t& corner : counted) corner -= p.first_vertex;
+        p.closed = is_closed(std::span(positions).subspan(p.first_vertex, p.vertex_count), counted);
     }
 }
 

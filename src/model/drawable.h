@@ -72,6 +72,7 @@ struct Primitive {
     uint32_t first_node = 0, node_count = 0;  ///< of Drawable::bvh; leaves count triangles of this primitive
     Box3 bounds;
     uint32_t first_weights = UINT32_MAX;  ///< of Drawable::weights, one a vertex; UINT32_MAX: rigid
+    bool closed = false;                  ///< is_closed() of closed.h, at rest; finish() finds out
 };
 
 struct DrawNode {

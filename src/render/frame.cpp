@@ -179,7 +179,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     }
     out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
-    if (in.has_meshes) out.push_back(&kMeshShadow);
+    if (in.has_meshes) out.push_back(&mesh_shadow_kernel(in));
     out.push_back(&light_kernel(in));
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (in.taa && in.moved.owners.count > 0) out.push_back(&specialised(kOutlineMask, in.moved.owners.use));

@@ -231,6 +231,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     clusters_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
     triangles_ = triangles_drawn_ = 0;
+    holes_ = false;
     if (frame.meshes.empty()) return {};
     const MeshSet set = make_mesh_set(frame);
     if (set.empty()) return {};
@@ -277,12 +278,16 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         const Matrix back = model::inverse(place);
         const model::Surface& surface = set.drawable(part).surfaces[p.surface];
         const bool moved = part.first_moved != UINT32_MAX;
-        parts_.push_back(
-            {row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2), row(back, 0),
-             row(back, 1), row(back, 2), at.first_surface + p.surface, (at.first_corner + p.first_index) / 3,
-             moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
-             moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
-             (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u), p.index_count / 3, 0});
+        parts_.push_back({row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2),
+                          row(back, 0), row(back, 1), row(back, 2), at.first_surface + p.surface,
+                          (at.first_corner + p.first_index) / 3,
+                          moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
+                          moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
+                          (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u) |
+                              (p.closed && !moved && !surface.mask ? kMeshClosed : 0u) |
+                              (model::determinant(place) < 0 ? kMeshMirrored : 0u),
+                          p.index_count / 3, 0});
+        holes_ = holes_ || surface.mask;
         triangles_ += p.index_count / 3;
     }
     std::vector<bool> in_sight;

@@ -35,6 +35,7 @@ public:
     Result<void> update(const Frame& frame, const shade::CameraParams& camera);
     MeshHandles import(Graph& g) const;
     bool empty() const { return parts_.empty(); }
+    bool holes() const { return holes_; }  // in some part, in sight or not
     uint64_t triangles() const { return triangles_; }
     uint64_t triangles_drawn() const { return triangles_drawn_; }
 
@@ -57,6 +58,7 @@ private:
     std::vector<MeshPart> parts_;
     std::vector<MeshClusterRef> clusters_;
     uint32_t one_sided_ = 0, double_sided_ = 0, masked_ = 0;
+    bool holes_ = false;
     uint64_t triangles_ = 0, triangles_drawn_ = 0;
 };
 

@@ -81,7 +81,8 @@ struct Block {
 class Readback {
 public:
     Readback() = default;
-    bool ready() const;  // get() would not wait
+    bool ready() const;        // get() would not wait
+    std::string name() const;  // of what it reads
     // Waits for the frame. Images: rows tightly packed, slices or layers one after the other.
     // An error if the frame was never executed, or failed.
     Result<std::vector<std::byte>> get() const;

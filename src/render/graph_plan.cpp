@@ -21,6 +21,27 @@ bool same_shape(const GraphResource& a, const GraphResource& b) {
            a.mips == b.mips && a.bytes == b.bytes;
 }
 
+uint64_t frame_bytes(const Plan& plan, const GraphPass& pass) {
+    uint64_t sum = 0;
+    for (const GraphAccess& a : pass.accesses) {
+        const GraphResource& r = plan.resources[a.resource];
+        if (r.origin == Origin::Imported) continue;
+        uint64_t bytes = r.bytes;
+        if (r.is_image) {
+            uint64_t texels = 0;
+            for (uint32_t m = a.range.base_mip; m < a.range.base_mip + a.range.mip_count; ++m) {
+                const rhi::Extent e = mip_size(r.size, m);
+                texels +=
+                    uint64_t{e.width} * e.height * (r.dimension == rhi::Dimension::D3 ? e.depth : a.range.layer_count);
+            }
+            bytes = texels * rhi::bytes_per_texel(r.format);
+        }
+        const bool writes = rhi::writes(a.access);
+        sum += bytes * (uint64_t{writes} + uint64_t{!writes || a.reads_old});
+    }
+    return sum;
+}
+
 size_t Plan::barrier_count() const {
     size_t n = epilogue.size();
     for (const PlanLevel& level : levels) n += level.barriers.size();

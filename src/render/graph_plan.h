@@ -83,6 +83,10 @@ struct CompileOptions {
     std::function<rhi::MemoryNeed(const rhi::BufferDesc&)> buffer_need = {};
 };
 
+// Bytes of what lives for this frame that the pass names, each texel counted once as read and once as written. What stays from frame to
+// frame (atlas, meshes, maps) is left out: a pass reads some of it, and which depends on the picture.
+uint64_t frame_bytes(const Plan& plan, const GraphPass& pass);
+
 // The same kind, size and format.
 bool same_shape(const GraphResource& a, const GraphResource& b);
 

@@ -51,6 +51,8 @@ Result<std::vector<std::byte>> Readback::get() const {
     return *state_->bytes;
 }
 
+std::string Readback::name() const { return state_ ? state_->name : std::string{}; }
+
 // ---- runner
 
 struct Runner::Impl {
@@ -61,8 +63,9 @@ struct Runner::Impl {
         rhi::SubmitId submit = 0;
         rhi::QuerySet queries = {};
         rhi::BufferHandle ticks = {};
-        bool ticks_held = false;  // the buffer has carried ticks before
-        uint32_t capacity = 0;    // passes
+        bool ticks_held = false;           // the buffer has carried ticks before
+        std::vector<uint64_t> bytes = {};  // of each pass
+        uint32_t capacity = 0;             // passes
         std::vector<std::string> names = {};
         bool collected = true;
         FrameTimes times = {};
@@ -189,20 +192,21 @@ Result<void> Runner::Impl::collect(Slot& slot) {
     if (!slot.queries) return {};
     const auto mapped = device.map(slot.ticks);
     if (!mapped) return mapped.error();
-    std::vector<uint64_t> ticks(slot.names.size() * 2);
+    // The frame's begin, then begin and end of each pass.
+    std::vector<uint64_t> ticks(slot.names.size() * 2 + 1);
     std::memcpy(ticks.data(), mapped->data(), ticks.size() * sizeof(uint64_t));
     device.unmap(slot.ticks);
     const double ms_per_tick = device.limits().timestamp_period_ns * 1e-6;
-    for (size_t i = 0; i < slot.names.size(); ++i)
-        slot.times.passes.push_back({slot.names[i], double(int64_t(ticks[2 * i + 1] - ticks[2 * i])) * ms_per_tick});
-    if (!ticks.empty()) {
-        uint64_t first = ticks[0], last = ticks[0];
-        for (const uint64_t t : ticks) {
-            first = std::min(first, t);
-            last = std::max(last, t);
-        }
-        slot.times.total_ms = double(last - first) * ms_per_tick;
+    // Once it has drawn a triangle, Mesa's software driver writes the ticks of a pass when it gets to the barrier after it: begin and end
+    // are one then, and a pass took as long as its end is after the end before.
+    const bool late = device.info().kind == rhi::DeviceKind::Cpu;
+    uint64_t done = ticks[0];
+    for (size_t i = 0; i < slot.names.size(); ++i) {
+        const uint64_t begin = late ? done : ticks[2 * i + 1], end = ticks[2 * i + 2];
+        slot.times.passes.push_back({slot.names[i], double(int64_t(end - begin)) * ms_per_tick, slot.bytes[i]});
+        done = std::max(done, end);
     }
+    slot.times.total_ms = double(done - ticks[0]) * ms_per_tick;
     if (slot.submit > newest.submit) newest = slot.times;
     return {};
 }
@@ -229,10 +233,10 @@ Result<void> Runner::Impl::reserve_queries(Slot& slot, uint32_t passes) {
     slot.queries = {};
     slot.ticks = {};
     slot.capacity = std::max(32u, passes * 2);
-    const auto queries = device.create_query_set({.count = slot.capacity * 2, .label = "pass times"});
+    const auto queries = device.create_query_set({.count = slot.capacity * 2 + 1, .label = "pass times"});
     if (!queries) return queries.error();
     slot.queries = *queries;
-    const auto ticks = device.create_buffer({.size = uint64_t{slot.capacity} * 16,
+    const auto ticks = device.create_buffer({.size = uint64_t{slot.capacity} * 16 + 8,
                                              .usage = rhi::BufferUsage::QueryResolve,
                                              .memory = rhi::MemoryKind::Readback,
                                              .label = "pass times"});
@@ -560,21 +564,26 @@ Result<rhi::SubmitId> Runner::Impl::submit(const Graph& graph, Slot& slot) {
     }
     auto encoder = device.create_encoder("frame");
     slot.names.clear();
+    slot.bytes.clear();
+    const rhi::Barrier free{.buffer = slot.ticks, .before = Access::HostRead, .after = Access::CopyWrite};
+    if (slot.queries && !plan.passes.empty()) {
+        encoder->write_timestamp(slot.queries, 0);
+        if (slot.ticks_held) Graph::emit(*encoder, {&free, 1});
+    }
     for (const PlanLevel& level : plan.levels) {
         emit(*encoder, level.barriers);
         for (const uint32_t p : level.passes) {
             const uint32_t n = uint32_t(slot.names.size());
             slot.names.push_back(plan.passes[p].name);
-            if (slot.queries) encoder->write_timestamp(slot.queries, 2 * n);
-            record(*encoder, plan.passes[p], prepared[p]);
+            slot.bytes.push_back(frame_bytes(plan, plan.passes[p]));
             if (slot.queries) encoder->write_timestamp(slot.queries, 2 * n + 1);
+            record(*encoder, plan.passes[p], prepared[p]);
+            if (slot.queries) encoder->write_timestamp(slot.queries, 2 * n + 2);
         }
     }
     emit(*encoder, plan.epilogue);
     if (slot.queries && !slot.names.empty()) {
-        const rhi::Barrier free{.buffer = slot.ticks, .before = Access::HostRead, .after = Access::CopyWrite};
-        if (slot.ticks_held) Graph::emit(*encoder, {&free, 1});
-        encoder->resolve_queries(slot.queries, 0, uint32_t(slot.names.size()) * 2, slot.ticks, 0);
+        encoder->resolve_queries(slot.queries, 0, uint32_t(slot.names.size()) * 2 + 1, slot.ticks, 0);
         const rhi::Barrier arrived{.buffer = slot.ticks, .before = Access::CopyWrite, .after = Access::HostRead};
         Graph::emit(*encoder, {&arrived, 1});
     }

@@ -16,7 +16,8 @@ struct RunnerOptions {
 
 struct PassTime {
     std::string name;
-    double ms = 0;  // passes of one level overlap: their sum may exceed the frame
+    double ms = 0;       // passes of one level overlap: their sum may exceed the frame
+    uint64_t bytes = 0;  // Plan::frame_bytes()
 };
 
 struct FrameTimes {

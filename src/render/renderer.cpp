@@ -129,6 +129,7 @@ struct Renderer::Impl {
         in.moved.owners.count = uint32_t(moved.records.size());
         in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
         in.moved.has_boxes = !moved.boxes.empty();
+        in.mesh_holes = meshes->holes();
         return in;
     }
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
@@ -191,8 +192,10 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
             std::find_if(stats.passes.begin(), stats.passes.end(), [&](const auto& p) { return p.first == name; });
         if (same != stats.passes.end()) {
             same->second += pass.ms;
+            stats.pass_bytes[size_t(same - stats.passes.begin())].second += pass.bytes;
         } else {
             stats.passes.emplace_back(name, pass.ms);
+            stats.pass_bytes.emplace_back(name, pass.bytes);
         }
     }
 }
@@ -210,7 +213,10 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         const std::vector<MaterialRecord> materials = material_records(frame);
         in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
         std::vector<shade::LightRecord> lights;
-        for (const Light& light : frame.lights) lights.push_back(shade::light_record(light));
+        for (const Light& light : frame.lights) {
+            lights.push_back(shade::light_record(light));
+            if (!settings.soft_shadows) lights.back().position.w = 0;
+        }
         in.light_count = uint32_t(lights.size());
         LightRects rects = settings.cull_lights ? light_rects(frame.lights, params.camera, params.tile_x, params.tile_y,
                                                               params.tile_width, params.tile_height)
@@ -255,8 +261,19 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         for (const Readback& counted : evaluations) {
             auto words = counted.get_as<uint32_t>();
             if (!words) return words.error();
-            for (const uint32_t n : *words) stats.evaluations += n;
+            uint64_t sum = 0;
+            for (const uint32_t n : *words) sum += n;
+            stats.evaluations += sum;
+            const std::string pass = counted.name().substr(0, counted.name().find(" evaluations"));
+            const auto same = std::find_if(stats.pass_evaluations.begin(), stats.pass_evaluations.end(),
+                                           [&](const auto& p) { return p.first == pass; });
+            if (same != stats.pass_evaluations.end())
+                same->second += sum;
+            else
+                stats.pass_evaluations.emplace_back(pass, sum);
         }
+        stats.transient_peak_bytes = std::max(stats.transient_peak_bytes, runner->stats().peak_bytes);
+        stats.transient_sum_bytes = std::max(stats.transient_sum_bytes, runner->stats().unaliased_bytes);
         if (!device->caps().timestamp) return {};
         auto times = runner->times(*submit);
         if (!times) return times.error();
@@ -395,10 +412,12 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
         stats.passes.emplace_back("bake", field->bake_ms());
+        stats.pass_bytes.emplace_back("bake", 0);
     }
     if (traces(frame, settings) && boxes->build_ms() > 0) {
         stats.frame_ms += boxes->build_ms();
         stats.passes.emplace_back("build boxes", boxes->build_ms());
+        stats.pass_bytes.emplace_back("build boxes", 0);
     }
     Picture picture;
     picture.width = settings.width;
@@ -481,6 +500,23 @@ Result<Picture> Renderer::render(const Frame& frame, const RenderSettings& setti
 }
 
 const RenderStats& Renderer::stats() const { return impl_->stats; }
+
+Quality Renderer::best_quality() const {
+    switch (impl_->device->info().kind) {
+    case rhi::DeviceKind::Cpu:
+        return Quality::Medium;
+    case rhi::DeviceKind::Discrete:
+        return Quality::Ultra;
+    default:
+        return Quality::High;
+    }
+}
+
+void set_quality(RenderSettings& settings, Quality quality) {
+    settings.refine = quality >= Quality::Medium;
+    settings.soft_shadows = quality >= Quality::High;
+    settings.taa = quality >= Quality::Ultra && settings.view == View::Shaded;
+}
 
 std::vector<DeviceInfo> devices() {
     std::vector<DeviceInfo> out;

@@ -138,6 +138,24 @@ TEST(Bench, TheSlowWaySeesOneTexelThatDiffers) {
     EXPECT_NE(brute_force(*sdf::compile({moved, {}, {}}), bricks.field()).checksum, stored(bricks).checksum);
 }
 
+TEST(BenchFrameGpu, EveryPassOfEverySizeIsARowAndPicturesAreTheSame) {
+    const std::vector<std::string> rows{"frame/workbench"};
+    BenchOptions o = small({0});
+    o.runs = 1;
+    o.sizes = {{48, 27}, {24, 16}};
+    const auto report = run_bench(rows, o);
+    ASSERT_TRUE(report) << report.error().message;
+    if (report->rows.empty()) GTEST_SKIP() << "no Vulkan device";
+    for (const char* name : {"frame/workbench/48x27/mesh shadow", "frame/workbench/48x27/all",
+                             "frame/workbench/24x16/mesh shadow", "frame/workbench/24x16/all"})
+        EXPECT_EQ(std::ranges::count(report->rows, name, &BenchRow::name), 1) << name;
+    for (const BenchRow& row : report->rows) {
+        EXPECT_GE(row.value, 0) << row.name;
+        EXPECT_EQ(row.unit, "ms");
+        EXPECT_EQ(row.checksum.size(), 16u) << row.name;
+    }
+}
+
 TEST(Bench, WrongWordsAreToldWithTheMend) {
     const std::vector<std::string> unknown{"feild"};
     const auto report = run_bench(unknown, small({0}));
@@ -148,6 +166,9 @@ TEST(Bench, WrongWordsAreToldWithTheMend) {
     BenchOptions none = small({0});
     none.count = 0;
     EXPECT_FALSE(run_bench({}, none));
+    BenchOptions flat = small({0});
+    flat.sizes = {{480, 0}};
+    EXPECT_FALSE(run_bench({}, flat));
 }
 
 }  // namespace

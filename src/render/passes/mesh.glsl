@@ -20,6 +20,9 @@ vec3 local_vector(MeshPart part, vec3 v) {
     return vec3(dot(part.local_x.xyz, v), dot(part.local_y.xyz, v), dot(part.local_z.xyz, v));
 }
 
+// What a linear function of the eye's frame, dot(c, p), is in the part's.
+vec3 mesh_covector(MeshPart part, vec3 c) { return c.x * part.eye_x.xyz + c.y * part.eye_y.xyz + c.z * part.eye_z.xyz; }
+
 // `triangle` counts from the part's first.
 uint mesh_corner(MeshPart part, uint triangle, uint corner) {
     return part.first_vertex + mesh_corners[3u * (part.first_triangle + triangle) + corner];

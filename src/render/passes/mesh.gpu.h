@@ -37,6 +37,9 @@ struct MeshPart {
 KILN_CONST uint kMeshDoubleSided = 1u;
 KILN_CONST uint kMeshMask = 2u;  // holes where alpha is less than the cutoff
 
+KILN_CONST uint kMeshClosed = 4u;    // every edge is shared by two triangles that run along it opposite ways
+KILN_CONST uint kMeshMirrored = 8u;  // its place in the world turns it inside out
+
 // What is drawn at once: up to kMeshCluster triangles of a part, neighbours in space.
 KILN_CONST uint kMeshCluster = 64u;
 struct MeshClusterRef {

@@ -1,8 +1,10 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// What meshes hide of each light's disc, multiplied into the fractions that the field leaves. One walk through the trees of boxes a light,
-// with the whole cone of rays at once: every triangle on the way covers a part of the disc, which is
-// kept as bits. No noise, no bias: rays start on the triangle itself.
+// What meshes hide of each light's disc, multiplied into the fractions that the field leaves. All rays from a point to the disc go through the
+// trees of boxes at once: every triangle on their way covers a part of the disc, which is kept as bits. No noise, no bias: rays start on the
+// triangle itself.
+//   The threads of a workgroup find the triangles together that may lie between them and the light (mesh_beam.glsl); where there is none,
+// all of them see the whole disc. What is found does not depend on it: without kFrameAccelerate all triangles of the scene are looked at.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -33,57 +35,17 @@ layout(set = 0, binding = 17) uniform texture2DArray page_5;
 layout(set = 0, binding = 18) uniform sampler page_sampler;
 layout(set = 0, binding = 19, std430) readonly buffer LightMasks { uint light_masks[]; };
 layout(push_constant) uniform Push { ShadowPush push; };
+// False: no part has holes.
+layout(constant_id = 7) const bool kHoles = true;
 
 #include "render/passes/mesh.glsl"
 #include "render/passes/rays.glsl"
 #include "render/passes/light_walk.glsl"
 #include "render/passes/surface.glsl"
 
-// The disc is looked at on 32 chords that stand for strips of equal area, each in 32 pieces: what a triangle covers of a chord is a stretch of
-// bits. A straight edge along the chords is off by at most half a strip, 1/64 of the disc; any other by less.
-const uint kChords = 32u;
-const float kChordPlaces[16] = float[16](0.024546, 0.073698, 0.123030, 0.172668, 0.222749, 0.273427, 0.324877, 0.377309, 0.430984, 0.486234, 0.543509, 0.603449, 0.667038, 0.735969, 0.813746, 0.911369);  // of the upper half: where (i + 0.5) / 32 of the disc is below
-
 const float kFarMetres = 1e7;  // meshes are nearer; squares of it are floats
 
-// All rays from a point to a light's disc: along + x across + y up, x² + y² <= 1; a ray's parameter counts metres along its middle.
-struct Cone {
-    vec3 from;
-    vec3 along, across, up;
-    vec3 slowest, fastest;  // components of any ray of it
-    float last;
-};
-
-Cone make_cone(vec3 from, vec3 along, vec3 across, vec3 up, float last) {
-    vec3 spread = sqrt(across * across + up * up);
-    return Cone(from, along, across, up, along - spread, along + spread, last);
-}
-
-// Whether some ray of the cone may meet the box: low <= from + t v <= high with v between slowest and fastest, as bounds on t.
-bool may_meet(Cone c, vec3 low, vec3 high) {
-    float first = 0.0;
-    float last = c.last;
-    for (int i = 0; i < 3; ++i) {
-        float above = high[i] - c.from[i];  // slowest t <= above
-        float below = low[i] - c.from[i];   // fastest t >= below
-        if (c.slowest[i] > 0.0) {
-            last = min(last, above / c.slowest[i]);
-        } else if (c.slowest[i] < 0.0) {
-            first = max(first, above / c.slowest[i]);
-        } else if (above < 0.0) {
-            return false;
-        }
-        if (c.fastest[i] > 0.0) {
-            first = max(first, below / c.fastest[i]);
-        } else if (c.fastest[i] < 0.0) {
-            last = min(last, below / c.fastest[i]);
-        } else if (below > 0.0) {
-            return false;
-        }
-    }
-    // A thousandth of a percent wider than rounding makes it.
-    return first <= last * 1.00001;
-}
+#include "render/passes/mesh_beam.glsl"
 
 float alpha_texel(uint page, vec3 at) {
     switch (page) {
@@ -113,78 +75,131 @@ bool is_hole(MeshSurface s, uint v[3], vec3 w) {
     return alpha < s.alpha_cutoff;
 }
 
+
+// The disc is looked at on 32 chords that stand for strips of equal area, each in 32 pieces: what a triangle covers of a chord is a stretch of
+// bits. A straight edge along the chords is off by at most half a strip, 1/64 of the disc; any other by less.
+const uint kChords = 32u;
+// Where (i + 0.5) / 32 of the disc is below.
+const float kChordPlaces[32] = float[32](-0.911369, -0.813746, -0.735969, -0.667038, -0.603449, -0.543509, -0.486234, -0.430984, -0.377309, -0.324877, -0.273427, -0.222749, -0.172668, -0.123030, -0.073698, -0.024546, 0.024546, 0.073698, 0.123030, 0.172668, 0.222749, 0.273427, 0.324877, 0.377309, 0.430984, 0.486234, 0.543509, 0.603449, 0.667038, 0.735969, 0.813746, 0.911369);
+
 uint covered[kChords];
+uint full_chords;
 bool all_covered;
+
+// How many chords, as a real number, lie below x: the disc's share there, see kChordPlaces.
+float chords_below(float x) {
+    x = clamp(x, -1.0, 1.0);
+    return float(kChords) * (0.5 + (x * sqrt(1.0 - x * x) + asin(x)) / kPi) - 0.5;
+}
 
 // The bits from `first` to `last`.
 uint stretch(float first, float last) {
-    int from = max(int(ceil(first)), 0);
-    int to = min(int(floor(last)), 31);
+    int from = int(ceil(clamp(first, 0.0, 32.0)));
+    int to = int(floor(clamp(last, -1.0, 31.0)));
     return to < from ? 0u : (0xffffffffu >> uint(31 - (to - from))) << uint(from);
 }
 
-// Adds what the triangle covers.
-void cover(Cone c, MeshPart part, uint triangle, bool hard) {
-    uint corner[3];
-    vec3 p[3];
+// A light's disc seen from a point: a place p has dot(x, p - from) / dot(along, p - from) on it, likewise y.
+struct Disc {
+    vec3 from;
+    vec3 along, x, y;
+    float last;  // metres along its middle
+    bool hard;   // a point
+};
+
+// What a triangle may cover of a disc: where middle + x by_x + y by_y >= 0 in all components. Three are volumes of the ray and two corners each;
+// a ray meets the triangle where they have the sign that the triangle's plane has seen from its start. The fourth, of the ray and the whole
+// triangle, is too small where it lies behind the light.
+struct Shade {
+    vec4 middle, by_x, by_y;
+    float low, high;  // of x
+    uint slot;        // of the chunk's triangles
+};
+
+bool is_hole_of(Shade shade, vec3 w) {
+    uvec2 leaf = leaves[shade.slot / kInLeaf];
+    MeshPart part = mesh_parts[leaf.x];
+    uint v[3];
+    for (uint i = 0u; i < 3u; ++i) v[i] = mesh_corner(part, (leaf.y >> 3u) + shade.slot % kInLeaf, i);
+    return is_hole(mesh_surfaces[part.surface], v, w / (w.x + w.y + w.z));
+}
+
+// The chunk's triangle `slot`, of a part with these flags. False: nothing. Sets all_covered where it hides the whole disc.
+bool may_shade(Disc disc, uint slot, uint flags, out Shade shade) {
+    shade.slot = slot;
+    vec3 p[3];  // x, y and 1 on the disc, times metres along its middle
     for (uint i = 0u; i < 3u; ++i) {
-        corner[i] = mesh_corner(part, triangle, i);
-        p[i] = vertex_position(corner[i]) - c.from;
+        uint at = 9u * slot + 3u * i;
+        vec3 q = vec3(leaf_places[at], leaf_places[at + 1u], leaf_places[at + 2u]) - disc.from;
+        p[i] = vec3(dot(disc.x, q), dot(disc.y, q), dot(disc.along, q));
     }
-    // Volumes of the ray and two corners each, linear on the disc. A ray meets the triangle where they have the sign that the triangle's plane
-    // has seen from its start; and behind `last`, where the fourth, of the ray and the whole triangle, is too small.
     vec3 n = cross(p[1] - p[0], p[2] - p[0]);
     float height = dot(n, p[0]);
-    if (height == 0.0) return;
     float side = height < 0.0 ? -1.0 : 1.0;
     vec3 e0 = side * cross(p[1], p[2]);
     vec3 e1 = side * cross(p[2], p[0]);
     vec3 e2 = side * cross(p[0], p[1]);
-    n *= side * c.last;
-    vec4 middle = vec4(dot(e0, c.along), dot(e1, c.along), dot(e2, c.along), dot(n, c.along) - abs(height));
-    vec4 by_x = vec4(dot(e0, c.across), dot(e1, c.across), dot(e2, c.across), dot(n, c.across));
-    vec4 by_y = vec4(dot(e0, c.up), dot(e1, c.up), dot(e2, c.up), dot(n, c.up));
-    vec4 reach = sqrt(by_x * by_x + by_y * by_y);
-    if (any(lessThan(middle + reach, vec4(0.0)))) return;
-    bool holes = (part.flags & kMeshMask) != 0u;
-    if (hard) {
-        all_covered = !holes || !is_hole(mesh_surfaces[part.surface], corner, middle.xyz / (middle.x + middle.y + middle.z));
-        return;
+    n *= side * disc.last;
+    shade.middle = vec4(e0.z, e1.z, e2.z, n.z - abs(height));
+    shade.by_x = vec4(e0.x, e1.x, e2.x, n.x);
+    shade.by_y = vec4(e0.y, e1.y, e2.y, n.y);
+    vec4 reach = disc.hard ? vec4(0.0) : sqrt(shade.by_x * shade.by_x + shade.by_y * shade.by_y);
+    shade.low = -1.0;
+    shade.high = 1.0;
+    if (p[0].z > 0.0 && p[1].z > 0.0 && p[2].z > 0.0) {
+        vec3 x = vec3(p[0].x / p[0].z, p[1].x / p[1].z, p[2].x / p[2].z);
+        shade.low = max(min(min(x.x, x.y), x.z), -1.0);
+        shade.high = min(max(max(x.x, x.y), x.z), 1.0);
     }
-    if (!holes && all(greaterThanEqual(middle - reach, vec4(0.0)))) {
-        all_covered = true;
-        return;
-    }
-    uint left = 0u;  // bits that are still seen
-    for (uint i = 0u; i < kChords; ++i) {
-        uint before = covered[i];
-        if (before == 0xffffffffu) continue;
-        float x = i < 16u ? -kChordPlaces[15u - i] : kChordPlaces[i - 16u];
+    // Of a closed surface the faces that are turned to the point hide all that it hides.
+    bool turned_away = (flags & kMeshClosed) != 0u && (height < 0.0) == ((flags & kMeshMirrored) != 0u);
+    if (height == 0.0 || turned_away || any(lessThan(shade.middle + reach, vec4(0.0)))) return false;
+    bool some_left = kHoles && (flags & kMeshMask) != 0u;
+    if (some_left && disc.hard)
+        some_left = is_hole_of(shade, shade.middle.xyz);
+    else
+        some_left = some_left || any(lessThan(shade.middle - reach, vec4(0.0)));
+    all_covered = !some_left;
+    return !disc.hard;
+}
+
+void cover(Shade shade, uint flags) {
+    // The chords that reach into the triangle.
+    uint i = uint(max(ceil(chords_below(shade.low) - 0.05), 0.0));
+    uint end = uint(clamp(floor(chords_below(shade.high) + 1.05), 0.0, float(kChords)));
+    // Where along a chord each volume changes sign: y = at + by * x, from below or from above. A volume that does not depend on y does so far out.
+    vec4 slope = mix(shade.by_y, vec4(1e-20), lessThan(abs(shade.by_y), vec4(1e-20)));
+    vec4 at = -shade.middle / slope;
+    vec4 by = -shade.by_x / slope;
+    bvec4 up = greaterThan(slope, vec4(0.0));
+    vec4 up_at = mix(vec4(-2.0), at, up);
+    vec4 up_by = mix(vec4(0.0), by, up);
+    vec4 down_at = mix(at, vec4(2.0), up);
+    vec4 down_by = mix(by, vec4(0.0), up);
+    for (; i < end; ++i) {
+        float x = kChordPlaces[i];
         float half_length = sqrt(1.0 - x * x);
-        vec4 a = middle + x * by_x;
-        vec4 b = half_length * by_y;
-        // a + b y >= 0, for y from -1 to 1.
-        vec4 root = -a / b;
-        vec4 above = mix(vec4(-1.0), root, greaterThan(b, vec4(0.0)));
-        vec4 below = mix(vec4(1.0), root, lessThan(b, vec4(0.0)));
-        float first = max(max(max(above.x, above.y), max(above.z, above.w)), -1.0);
-        float last = min(min(min(below.x, below.y), min(below.z, below.w)), 1.0);
-        bool none = any(lessThan(a + abs(b), vec4(0.0)));
+        vec4 above = up_at + x * up_by;
+        vec4 below = down_at + x * down_by;
+        float first = max(max(max(above.x, above.y), max(above.z, above.w)), -half_length);
+        float last = min(min(min(below.x, below.y), min(below.z, below.w)), half_length);
         // The pieces of neighbouring chords lie beside each other's edges, not in rows.
         float shift = fract(float(i) * 0.618034);
-        uint bits = none ? 0u : stretch(16.0 * (first + 1.0) - shift, 16.0 * (last + 1.0) - shift);
-        if (holes) {
+        float pieces = 16.0 / half_length;
+        uint bits = stretch(pieces * first + (16.0 - shift), pieces * last + (16.0 - shift));
+        if (kHoles && (flags & kMeshMask) != 0u) {
             for (uint k = 0u; k < 32u; k += 4u) {
                 if (((bits >> k) & 15u) == 0u) continue;
-                float y = (float(k) + 1.5 + shift) / 16.0 - 1.0;
-                vec3 e = a.xyz + y * b.xyz;
-                if (is_hole(mesh_surfaces[part.surface], corner, e / (e.x + e.y + e.z))) bits &= ~(15u << k);
+                float y = ((float(k) + 1.5 + shift) / 16.0 - 1.0) * half_length;
+                if (is_hole_of(shade, shade.middle.xyz + x * shade.by_x.xyz + y * shade.by_y.xyz)) bits &= ~(15u << k);
             }
         }
-        covered[i] = before | bits;
-        left |= ~(before | bits);
+        uint before = covered[i];
+        uint now = before | bits;
+        covered[i] = now;
+        full_chords += uint(now == 0xffffffffu) - uint(before == 0xffffffffu);
     }
-    all_covered = left == 0u;
+    all_covered = full_chords == kChords;
 }
 
 // The triangle that the rays start on; none: kNoPart.
@@ -192,59 +207,73 @@ const uint kNoPart = 0xffffffffu;
 uint own_part = kNoPart;
 uint own_triangle = 0u;
 
-// How much of a light's disc no mesh hides.
-float unhidden(vec3 from, vec3 l, float tan_radius, float distance) {
-    Basis basis = basis_around(l);
-    bool hard = tan_radius <= 0.0;
-    for (uint i = 0u; i < kChords; ++i) covered[i] = 0u;
-    all_covered = false;
-    Cone cone = make_cone(from, l, basis.tangent * tan_radius, basis.bitangent * tan_radius, distance);
-    uint top = nodes[0].skip;
-    for (uint i = 0u; i < top && !all_covered;) {
-        MeshNode box = nodes[i];
-        if (!may_meet(cone, vec3(box.min_x, box.min_y, box.min_z), vec3(box.max_x, box.max_y, box.max_z))) {
-            i = box.skip;
-            continue;
-        }
-        ++i;
-        for (uint k = 0u; k < (box.leaf & 7u); ++k) {
-            uint which = (box.leaf >> 3u) + k;
-            MeshPart part = mesh_parts[which];
-            Cone local = make_cone(local_point(part, cone.from), local_vector(part, cone.along), local_vector(part, cone.across),
-                                   local_vector(part, cone.up), cone.last);
-            for (uint j = 0u; j < part.node_count && !all_covered;) {
-                MeshNode node = nodes[part.first_node + j];
-                if (!may_meet(local, vec3(node.min_x, node.min_y, node.min_z), vec3(node.max_x, node.max_y, node.max_z))) {
-                    j = node.skip;
-                    continue;
-                }
-                ++j;
-                for (uint t = 0u; t < (node.leaf & 7u) && !all_covered; ++t) {
-                    uint triangle = (node.leaf >> 3u) + t;
-                    if (which != own_part || triangle != own_triangle) cover(local, part, triangle, hard);
+// Covers what the chunk's triangles hide of a disc, first of those leaves that its middle is behind: a triangle that hides all of it is among
+// them. Loops are nested so that what costs most is done by all threads at once: each looks for a triangle that shades, then all draw one.
+void cover_leaves(Disc disc, Reach cone, Reach middle) {
+    uvec2 todo = uvec2(0u);
+    uvec2 later = uvec2(0u);
+    for (uint i = 0u; i < leaf_count; ++i) {
+        vec3 low = vec3(leaf_boxes[6u * i], leaf_boxes[6u * i + 1u], leaf_boxes[6u * i + 2u]);
+        vec3 high = vec3(leaf_boxes[6u * i + 3u], leaf_boxes[6u * i + 4u], leaf_boxes[6u * i + 5u]);
+        uint bit = may_meet(cone, low, high) ? 1u << (i & 31u) : 0u;
+        bool behind = may_meet(middle, low, high);
+        uvec2 bits = i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+        todo |= behind ? bits : uvec2(0u);
+        later |= behind ? uvec2(0u) : bits;
+    }
+    uint slot = 0u;
+    uint slot_end = 0u;
+    uint flags = 0u;
+    uint own = 0xffffffffu;  // the triangle that the rays start on
+    bool done = (todo.x | todo.y | later.x | later.y) == 0u;
+    while (!done) {
+        bool shades = false;
+        Shade shade;
+        do {
+            if (slot >= slot_end) {
+                bool none = (todo.x | todo.y) == 0u;
+                todo = none ? later : todo;
+                later = none ? uvec2(0u) : later;
+                done = (todo.x | todo.y) == 0u;
+                if (!done) {
+                    bool first_word = todo.x != 0u;
+                    uint leaf = first_word ? uint(findLSB(todo.x)) : 32u + uint(findLSB(todo.y));
+                    todo = first_word ? uvec2(todo.x & (todo.x - 1u), todo.y) : uvec2(0u, todo.y & (todo.y - 1u));
+                    uvec2 what = leaves[leaf];
+                    slot = kInLeaf * leaf;
+                    slot_end = slot + (what.y & 7u);
+                    flags = mesh_parts[what.x].flags;
+                    own = what.x == own_part ? slot + own_triangle - (what.y >> 3u) : 0xffffffffu;
                 }
             }
+            if (!done) {
+                shades = slot != own && may_shade(disc, slot, flags, shade);
+                done = all_covered;
+                ++slot;
+            }
+        } while (!shades && !done);
+        if (shades && !done) {
+            cover(shade, flags);
+            done = all_covered;
         }
     }
-    if (all_covered) return 0.0;
-    if (hard) return 1.0;
-    int hidden = 0;
-    for (uint i = 0u; i < kChords; ++i) hidden += bitCount(covered[i]);
-    return 1.0 - float(hidden) / float(32u * kChords);
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
-    uvec4 fractions = texelFetch(fractions_of_field, pixel, 0);
-    uvec4 seen = texelFetch(visibility, pixel, 0);
+    bool in_tile = pixel.x < frame.tile_width && pixel.y < frame.tile_height;
+    uvec4 fractions = in_tile ? texelFetch(fractions_of_field, pixel, 0) : uvec4(0u);
+    uvec4 seen = in_tile ? texelFetch(visibility, pixel, 0) : uvec4(0u);
     uint state = seen.y >> 28u;
-    if (state != kSeenNothing && state != kSeenInside && fractions != uvec4(0u)) {
+    bool lit = in_tile && state != kSeenNothing && state != kSeenInside && fractions != uvec4(0u);
+    vec3 from = vec3(0.0);
+    vec3 p_world = vec3(0.0);
+    if (lit) {
         SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
         TexelRay ray = pixel_ray(pixel);
         float h = frame.grid.voxel_size;
         float t = uintBitsToFloat(seen.x) * h;
-        vec3 from = ray.direction * t;
+        from = ray.direction * t;
         // As far off the surface as floats of its place, and of bricks, may be wrong.
         float off = 4e-6 * max(t, 0.1);
         vec3 outwards = surface.normal;
@@ -274,17 +303,48 @@ void main() {
             off = max(off, 2e-3 * h);
         }
         from += outwards * off;
-        vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * h;
-        LightWalk walk = light_walk(pixel, push.first_light);
-        for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
-            uint index = next_light(walk);
-            if (index == kNoLight) break;
-            float before = visible_fraction(fractions, channel);
-            if (before <= 0.0) continue;
-            LightSample light = sample_light(lights[index], p_world);
-            float left = unhidden(from, light.l, light.tan_radius, min(light.distance, kFarMetres));
-            set_visible_fraction(fractions, channel, before * left);
-        }
+        p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * h;
     }
-    imageStore(visible_fractions, pixel, fractions);
+    bound_tile(lit, from, fractions);
+    LightWalk walk = light_walk(ivec2(gl_WorkGroupID.xy) * kTileGroup, push.first_light);
+    for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
+        uint index = next_light(walk);
+        if (index == kNoLight) break;
+        if ((tile_wants & (1u << channel)) == 0u) continue;
+        begin_light(lights[index]);
+        float before = visible_fraction(fractions, channel);
+        bool open = lit && before > 0.0;
+        LightSample light = sample_light(lights[index], p_world);
+        float last = min(light.distance, kFarMetres);
+        Basis basis = basis_around(light.l);
+        bool hard = light.tan_radius <= 0.0;
+        float by_size = hard ? 1.0 : 1.0 / light.tan_radius;
+        Disc disc = Disc(from, light.l, basis.tangent * by_size, basis.bitangent * by_size, last, hard);
+        Reach cone = cone_reach(from, light.l, basis.tangent * light.tan_radius, basis.bitangent * light.tan_radius, last);
+        Reach middle = cone_reach(from, light.l, vec3(0.0), vec3(0.0), last);
+        for (uint i = 0u; i < kChords; ++i) covered[i] = 0u;
+        full_chords = 0u;
+        all_covered = false;
+        bool more = true;
+        while (more) {
+            next_leaves();
+            if (open && leaf_count != 0u) {
+                cover_leaves(disc, cone, middle);
+                open = !all_covered;
+            }
+            more = branch_count != 0u;  // the same in all threads
+            if (more) {
+                if (open) atomicOr(tile_open, 1u);
+                barrier();
+                more = tile_open != 0u;
+                barrier();
+            }
+        }
+        if (!lit || before <= 0.0) continue;
+        int hidden = 0;
+        for (uint i = 0u; i < kChords; ++i) hidden += bitCount(covered[i]);
+        float left = all_covered ? 0.0 : (hard ? 1.0 : 1.0 - float(hidden) / float(32u * kChords));
+        set_visible_fraction(fractions, channel, before * left);
+    }
+    if (in_tile) imageStore(visible_fractions, pixel, fractions);
 }

@@ -20,13 +20,15 @@ namespace {
 constexpr rhi::ColorTarget kIds[] = {{.format = rhi::Format::Rg32Uint}};
 constexpr rhi::DepthState kDepth{.format = rhi::Format::Depth32Float};
 constexpr uint32_t kGroupsInRow = 32768;  // of a mesh shader: fewer than a device takes along an axis
+constexpr rhi::SpecConstant kWithoutHoles[] = {{7, 0}};
 constexpr rhi::SamplerDesc kTrilinear{.mip = rhi::Filter::Linear, .address = rhi::AddressMode::Repeat};
 
 }  // namespace
 
 const Kernel kMeshSee{"mesh see", kMeshSeeSpv};
 const Kernel kMeshResolve{"mesh resolve", kMeshResolveSpv};
-const Kernel kMeshShadow{"mesh shadow", kMeshShadowSpv};
+const Kernel kMeshShadow{"mesh shadow", kMeshShadowSpv, kWithoutHoles};
+const Kernel kMeshShadowHoles{"mesh shadow", kMeshShadowSpv};
 const RasterKernel kMeshOneSided{.name = "meshes",
                                  .vertex = kMeshVertexVertSpv,
                                  .fragment = kMeshIdFragSpv,
@@ -63,6 +65,7 @@ const RasterKernel kMeshMaskedGroups{.name = "meshes by groups with holes",
                                      .colors = kIds,
                                      .depth = kDepth,
                                      .mesh = kMeshGroupsMeshSpv};
+const Kernel& mesh_shadow_kernel(const TileInputs& in) { return in.mesh_holes ? kMeshShadowHoles : kMeshShadow; }
 
 Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
     const MeshHandles& m = in.meshes;
@@ -118,7 +121,7 @@ Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, cons
     for (size_t page = 0; page < kMeshPages; ++page) uses.push_back(g.read(m.pages[page]));
     uses.push_back(g.sampler(kTrilinear));
     uses.push_back(g.read(light_masks));
-    g.dispatch(kMeshShadow, in.size, uses, push);
+    g.dispatch(mesh_shadow_kernel(in), in.size, uses, push);
     return out;
 }
 

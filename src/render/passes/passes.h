@@ -24,7 +24,7 @@ extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances
     kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
     kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
-extern const Kernel kMeshSee, kMeshResolve, kMeshShadow;
+extern const Kernel kMeshSee, kMeshResolve, kMeshShadow, kMeshShadowHoles;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
 extern const RasterKernel kMeshOneSidedGroups, kMeshDoubleSidedGroups, kMeshMaskedGroups;  // by a mesh shader
 extern const TraceKernel kMarchTrace;
@@ -100,7 +100,8 @@ struct TileInputs {
     BoxHandles boxes;          // with `rt`
     bool rt = false;           // the bricks are marched by rays through their boxes
     bool mesh_shader = false;  // clusters of meshes are drawn by a mesh shader
-    MovedHandles moved;  // with taa
+    MovedHandles moved;        // with taa
+    bool mesh_holes = false;
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -136,6 +137,7 @@ void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
 Image shadow_meshes(Graph& g, const TileInputs& in, const Surface& surface, const Buffer& light_masks,
                     const Image& fractions, const ShadowPush& push);
 
+const Kernel& mesh_shadow_kernel(const TileInputs& in);
 const Kernel& resolve_kernel(const TileInputs& in);
 const Kernel& shadow_kernel(const TileInputs& in);
 // Which lights may reach which tile; see cluster.comp and light_walk.glsl.

@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: MIT
+// The triangles that a workgroup's points and a light may have between them. The threads open the trees of boxes together; what the hull of
+// points and light surely misses is left out. Leaves come in chunks, their triangles in shared memory, counted from the eye.
+// The including kernel declares first: FrameParams frame, MeshNode nodes[], MeshPart mesh_parts[], and includes mesh.glsl and lights.gpu.h.
+
+// Bounds of a bundle of rays: the place at a parameter from 0 to last has components between low + slowest t and high + fastest t.
+struct Reach {
+    vec3 low, high;
+    vec3 by_slowest, by_fastest;  // 1 / slope; a slope of 0 counts as a very small one
+    float last;
+};
+
+vec3 inverse_slope(vec3 slope) { return 1.0 / mix(slope, vec3(1e-30), lessThan(abs(slope), vec3(1e-30))); }
+
+// All rays from a point to a disc: along + x across + y upwards, x² + y² <= 1; the parameter counts metres along its middle.
+Reach cone_reach(vec3 from, vec3 along, vec3 across, vec3 upwards, float last) {
+    vec3 spread = sqrt(across * across + upwards * upwards);
+    return Reach(from, from, inverse_slope(along - spread), inverse_slope(along + spread), last);
+}
+
+// Whether some ray of the bundle may meet the box: bounds on the parameter, from slowest t <= high - r.low and fastest t >= low - r.high.
+bool may_meet(Reach r, vec3 low, vec3 high) {
+    vec3 above = (high - r.low) * r.by_slowest;
+    vec3 below = (low - r.high) * r.by_fastest;
+    bvec3 rising = greaterThan(r.by_slowest, vec3(0.0));
+    bvec3 falling = lessThan(r.by_fastest, vec3(0.0));
+    vec3 last = min(mix(vec3(1e30), above, rising), mix(vec3(1e30), below, falling));
+    vec3 first = max(mix(above, vec3(0.0), rising), mix(below, vec3(0.0), falling));
+    // A thousandth of a percent wider than rounding makes it.
+    return max(max(max(first.x, first.y), first.z), 0.0) <= min(min(min(last.x, last.y), last.z), r.last) * 1.00001;
+}
+
+// A subtree by its first node: of a part, or of the parts' tree.
+struct Branch {
+    uint part, node;
+};
+const uint kTopTree = 0xffffffffu;
+const uint kMostBranches = 256u;
+const uint kMostLeaves = 64u;
+const uint kEnoughLeaves = 40u;  // of a chunk
+const uint kInLeaf = 4u;         // model::kMostInLeaf
+
+shared Branch branches[kMostBranches];  // still to be opened
+shared uint branch_count;
+shared uvec2 leaves[kMostLeaves];  // part; first triangle << 3 | count
+shared uint leaf_count;
+shared float leaf_boxes[6u * kMostLeaves];                // low, high, counted from the eye
+shared float leaf_places[9u * kInLeaf * kMostLeaves];     // corners of their triangles
+shared uint tile_low[3], tile_high[3];                    // ordered_bits(): of the points' box
+shared uint tile_wants;                                   // a bit a light of this batch: some point sees some of it
+shared uint tile_open;                                    // some point may still see some of the light
+
+Reach tile_beam;
+
+// Unsigned integers in the order of floats, and back.
+uint ordered_bits(float x) {
+    uint bits = floatBitsToUint(x);
+    return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
+}
+float float_of_ordered(uint key) { return uintBitsToFloat((key & 0x80000000u) != 0u ? key & 0x7fffffffu : ~key); }
+
+// The points of the workgroup, and which lights they want.
+void bound_tile(bool lit, vec3 from, uvec4 fractions) {
+    uint thread = gl_LocalInvocationIndex;
+    if (thread < 3u) {
+        tile_low[thread] = ~0u;
+        tile_high[thread] = 0u;
+    }
+    if (thread == 0u) tile_wants = 0u;
+    barrier();
+    if (lit) {
+        for (int axis = 0; axis < 3; ++axis) {
+            atomicMin(tile_low[axis], ordered_bits(from[axis]));
+            atomicMax(tile_high[axis], ordered_bits(from[axis]));
+        }
+        uint wants = 0u;
+        for (uint channel = 0u; channel < kLightsAtOnce; ++channel)
+            if (((fractions[channel >> 2u] >> (8u * (channel & 3u))) & 255u) != 0u) wants |= 1u << channel;
+        atomicOr(tile_wants, wants);
+    }
+    barrier();
+    tile_beam.low = vec3(float_of_ordered(tile_low[0]), float_of_ordered(tile_low[1]), float_of_ordered(tile_low[2]));
+    tile_beam.high = vec3(float_of_ordered(tile_high[0]), float_of_ordered(tile_high[1]), float_of_ordered(tile_high[2]));
+}
+
+// The hull of the points and the light. The parameter runs from 0 at the points to 1 at the light, so that both ends are as narrow as they are.
+void aim_beam(LightRecord light) {
+    tile_beam.last = 1.0;
+    vec3 slowest;
+    vec3 fastest;
+    if (light.kind == kLightDirectional) {
+        vec3 spread = vec3(light.position.w);  // of the disc's radius whichever way it faces
+        slowest = (-light.direction.xyz - spread) * kFarMetres;
+        fastest = (-light.direction.xyz + spread) * kFarMetres;
+    } else {
+        vec3 eye = (vec3(frame.eye_x, frame.eye_y, frame.eye_z) + vec3(frame.eye_part_x, frame.eye_part_y, frame.eye_part_z)) * frame.grid.voxel_size;
+        vec3 at = light.position.xyz - eye;
+        // Far out, floats of the world's places say where the light is to no more than this.
+        vec3 slack = vec3(light.position.w * 1.0001) + 1e-6 * (abs(light.position.xyz) + abs(eye) + abs(at));
+        slowest = at - slack - tile_beam.low;
+        fastest = at + slack - tile_beam.high;
+    }
+    tile_beam.by_slowest = inverse_slope(slowest);
+    tile_beam.by_fastest = inverse_slope(fastest);
+}
+
+// The box of a branch's node, counted from the eye.
+void node_box(Branch b, out vec3 low, out vec3 high) {
+    if (b.part == kTopTree) {
+        MeshNode node = nodes[b.node];
+        low = vec3(node.min_x, node.min_y, node.min_z);
+        high = vec3(node.max_x, node.max_y, node.max_z);
+        return;
+    }
+    MeshPart part = mesh_parts[b.part];
+    MeshNode node = nodes[part.first_node + b.node];
+    vec3 low_local = vec3(node.min_x, node.min_y, node.min_z);
+    vec3 high_local = vec3(node.max_x, node.max_y, node.max_z);
+    vec3 middle = mesh_point(part, 0.5 * (low_local + high_local));
+    vec3 size = 0.5 * (high_local - low_local);
+    vec3 half_size = vec3(dot(abs(part.eye_x.xyz), size), dot(abs(part.eye_y.xyz), size), dot(abs(part.eye_z.xyz), size));
+    half_size += 2e-6 * (abs(middle) + half_size + abs(vec3(part.eye_x.w, part.eye_y.w, part.eye_z.w)));
+    low = middle - half_size;
+    high = middle + half_size;
+}
+
+// Without kFrameAccelerate every branch is kept: the slow twin.
+void keep_branch(Branch b) {
+    vec3 low;
+    vec3 high;
+    node_box(b, low, high);
+    if ((frame.flags & kFrameAccelerate) != 0u && !may_meet(tile_beam, low, high)) return;
+    branches[atomicAdd(branch_count, 1u)] = b;
+}
+
+// All threads of the workgroup come here, and to next_leaves().
+void begin_light(LightRecord light) {
+    barrier();  // nobody reads what the light before left
+    aim_beam(light);
+    if (gl_LocalInvocationIndex == 0u) {
+        branch_count = 0u;
+        keep_branch(Branch(kTopTree, 0u));
+    }
+    barrier();
+}
+
+// The next chunk: leaf_count is 0 where there is none.
+void next_leaves() {
+    uint thread = gl_LocalInvocationIndex;
+    if (thread == 0u) {
+        leaf_count = 0u;
+        tile_open = 0u;
+    }
+    barrier();
+    while (branch_count > 0u && leaf_count < kEnoughLeaves) {
+        uint count = branch_count;
+        // Each makes one leaf, or up to four branches. A list near its end is opened one by one from there, which lengthens it by no more than the
+        // depth of the trees.
+        uint opened = min(min(count, kMostLeaves - leaf_count), count < 189u ? (192u - count) / 3u : 1u);
+        Branch b = thread < opened ? branches[count - opened + thread] : Branch(0u, 0u);
+        barrier();
+        if (thread == 0u) branch_count = count - opened;
+        barrier();
+        if (thread < opened) {
+            uint first_node = b.part == kTopTree ? 0u : mesh_parts[b.part].first_node;
+            uint leaf = nodes[first_node + b.node].leaf;
+            if (b.part != kTopTree && leaf != 0u) {
+                uint i = atomicAdd(leaf_count, 1u);
+                leaves[i] = uvec2(b.part, leaf);
+                vec3 low;
+                vec3 high;
+                node_box(b, low, high);
+                for (uint axis = 0u; axis < 3u; ++axis) {
+                    leaf_boxes[6u * i + axis] = low[axis];
+                    leaf_boxes[6u * i + 3u + axis] = high[axis];
+                }
+            } else {
+                // The children of a node follow it; the parts of a leaf have trees of their own.
+                uint end = leaf != 0u ? (leaf >> 3u) + (leaf & 7u) : nodes[first_node + b.node].skip;
+                for (uint child = leaf != 0u ? leaf >> 3u : b.node + 1u; child < end;) {
+                    keep_branch(leaf != 0u ? Branch(child, 0u) : Branch(b.part, child));
+                    child = leaf != 0u ? child + 1u : nodes[first_node + child].skip;
+                }
+            }
+        }
+        barrier();
+    }
+    for (uint i = thread; i < kInLeaf * leaf_count; i += uint(kTileGroup * kTileGroup)) {
+        uvec2 leaf = leaves[i / kInLeaf];
+        if (i % kInLeaf >= (leaf.y & 7u)) continue;
+        MeshPart part = mesh_parts[leaf.x];
+        for (uint corner = 0u; corner < 3u; ++corner) {
+            vec3 p = mesh_point(part, vertex_position(mesh_corner(part, (leaf.y >> 3u) + i % kInLeaf, corner)));
+            for (uint axis = 0u; axis < 3u; ++axis) leaf_places[9u * i + 3u * corner + axis] = p[axis];
+        }
+    }
+    barrier();
+}

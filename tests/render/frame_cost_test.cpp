@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: MIT
+// What a renderer tells of a picture's cost, and what --quality changes.
+#include "drawables.h"
+#include "gpu_worlds.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace kiln::render {
+namespace {
+
+struct FrameCostGpu : testing::Test {
+    void SetUp() override {
+        renderer = renderer_or_skip();
+        if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
+    }
+    // A ball on a slab, a sheet above them, one round lamp.
+    static Frame scene() {
+        field::worlds::World w;
+        w.name = "slab";
+        w.edits = {field::worlds::edit(Box{.half_extents = {1.2f, 0.1f, 1.2f}}, {0, -0.5f, 0}),
+                   field::worlds::edit(Sphere{.radius = 0.3f}, {0, -0.1f, 0})};
+        w.options.voxel_size = 0.05f;
+        w.options.bounds = Box3{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}};
+        Frame frame = frame_of(w, {0.6f, 1.0f, 2.6f});
+        frame.lights = {{.kind = Light::Kind::Point, .position = {0.8f, 1.5f, 0.4f}, .intensity = 6, .radius = 0.25f}};
+        model::Surface s = meshes::matte({0.6f, 0.6f, 0.6f});
+        s.double_sided = true;
+        frame.meshes.push_back(meshes::at(meshes::sheet(-0.3f, -0.3f, 0.3f, 0.3f, s), {0.5f, 0.4f, 0.3f}));
+        frame.camera.bloom = 0.1f;
+        return frame;
+    }
+    std::unique_ptr<Renderer> renderer;
+};
+
+TEST_F(FrameCostGpu, EveryPassTellsItsBytesAndTransientsShareTheirMemory) {
+    const RenderSettings settings{.width = 96, .height = 64};
+    (void)rhi::must(renderer->render(scene(), settings));
+    const RenderStats& s = renderer->stats();
+    ASSERT_EQ(s.pass_bytes.size(), s.passes.size());
+    for (size_t i = 0; i < s.passes.size(); ++i) EXPECT_EQ(s.pass_bytes[i].first, s.passes[i].first);
+    const auto of = [](const auto& list, std::string_view name) {
+        return std::find_if(list.begin(), list.end(), [&](const auto& p) { return p.first == name; })->second;
+    };
+    // Visibility, surface, fractions read and fractions written: four images of four words; the masks of 6 x 4 tiles, a word each; one light.
+    const uint64_t pixels = 96 * 64;
+    EXPECT_GE(of(s.pass_bytes, "mesh shadow"), 4 * 16 * pixels + 24 * 4 + 64);
+    EXPECT_LE(of(s.pass_bytes, "mesh shadow"), 4 * 16 * pixels + 8192)
+        << "what stays from frame to frame does not count";
+    EXPECT_LE(of(s.pass_bytes, "march"), 16 * pixels + 8192) << "it writes words and counts; the atlas stays";
+    ASSERT_FALSE(s.pass_evaluations.empty());
+    EXPECT_GT(of(s.pass_evaluations, "march"), 0u);
+    EXPECT_EQ(s.evaluations, std::accumulate(s.pass_evaluations.begin(), s.pass_evaluations.end(), uint64_t{0},
+                                             [](uint64_t sum, const auto& p) { return sum + p.second; }));
+    EXPECT_GT(s.transient_peak_bytes, 0u);
+    EXPECT_LE(double(s.transient_peak_bytes), 0.6 * double(s.transient_sum_bytes));
+}
+
+TEST_F(FrameCostGpu, QualitiesChangeWhatTheySay) {
+    const Frame frame = scene();
+    const auto drawn = [&](Quality q) {
+        RenderSettings settings{.width = 96, .height = 64, .cut = true};
+        set_quality(settings, q);
+        return rhi::must(renderer->render(frame, settings));
+    };
+    const Picture low = drawn(Quality::Low), medium = drawn(Quality::Medium), high = drawn(Quality::High);
+    EXPECT_EQ(high.rgba, rhi::must(renderer->render(frame, {.width = 96, .height = 64})).rgba);
+    EXPECT_NE(low.depth, medium.depth) << "surfaces as the bricks have them";
+    EXPECT_EQ(medium.depth, high.depth);
+    // Hard shadows: a lamp without size, but for shadows alone.
+    Frame small = frame;
+    small.lights[0].radius = 0;
+    EXPECT_EQ(medium.rgba, rhi::must(renderer->render(small, {.width = 96, .height = 64})).rgba);
+    EXPECT_NE(medium.rgba, high.rgba);
+    RenderSettings ultra;
+    set_quality(ultra, Quality::Ultra);
+    EXPECT_TRUE(ultra.taa && ultra.refine && ultra.soft_shadows);
+}
+
+}  // namespace
+}  // namespace kiln::render
