@@ -45,9 +45,11 @@ template <typename At>
 void look_at(Batch& b, size_t count, const sdf::TapeView& tape, float h, At&& at) {
     const sdf::Points points{b.x.data(), b.y.data(), b.z.data(), int(count)};
     for (size_t k = 0; k < count; ++k) {
-        b.t[k] = b.t_before[k] = b.t_first[k];
+        // A copy: of at(k, b.t[k]), GCC 12 read b.t[k] as it was before this loop where the loop runs once.
+        const float t = b.t_first[k];
+        b.t[k] = b.t_before[k] = t;
         b.d_before[k] = 0;
-        const vec3 p = at(k, b.t[k]);
+        const vec3 p = at(k, t);
         b.size[k] = gpu::largest3({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
         b.gradient[k] = {};
     }
