@@ -3,6 +3,7 @@
 
 #include "base/format.h"
 #include "render/lib/pack.h"
+#include "render/passes/forward.h"
 #include "render/passes/instances.h"
 
 #include <cmath>
@@ -121,7 +122,10 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (wanted == View::Shaded) {
         Image radiance = light(g, in, surface.seen, surface);
-        if (in.taa) radiance = taa(g, in, radiance, surface.depth, motion(g, in, surface.seen));
+        Front front = draw_through(g, in, surface, radiance);
+        Image moved = in.taa ? motion(g, in, front.surface.seen) : radiance;  // not read without
+        draw_particles(g, in, surface.depth, front, radiance, moved);
+        if (in.taa) radiance = taa(g, in, radiance, front.surface.depth, moved);
         out.radiance = g.readback(radiance);
         if (in.develops) {
             Buffer exposure = in.exposure;
@@ -129,6 +133,7 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
             Image shown = tonemap(g, radiance, glow, exposure, in.camera);
             if (in.outline_count > 0) shown = outline(g, in, surface.seen, shown);
+            shown = draw_lines(g, in, surface.depth, shown);
             out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
         }
@@ -191,6 +196,8 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&shadow_kernel(in));
     if (in.has_meshes) out.push_back(&kMeshShadow);
     out.push_back(&light_kernel(in));
+    through_kernels(in, out);
+    if (in.has_particles) out.insert(out.end(), {&kParticles, in.image_sky ? &kParticlesLightImage : &kParticlesLight});
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
@@ -200,12 +207,15 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&kTonemap);
     if (in.outline_count > 0)
         out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
+    if (in.has_lines) out.push_back(&kLinesOver);
     return out;
 }
 
 std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
-    if (!in.has_meshes) return {};
-    return {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
+    std::vector<const RasterKernel*> out;
+    if (in.has_meshes) out = {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
+    if (in.has_lines) out.push_back(&kLines);
+    return out;
 }
 
 }  // namespace kiln::render

@@ -229,6 +229,7 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
 Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& camera) {
     parts_.clear();
     clusters_.clear();
+    blends_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
     triangles_ = triangles_drawn_ = 0;
     if (frame.meshes.empty()) return {};
@@ -277,12 +278,21 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         const Matrix back = model::inverse(place);
         const model::Surface& surface = set.drawable(part).surfaces[p.surface];
         const bool moved = part.first_moved != UINT32_MAX;
-        parts_.push_back(
-            {row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2), row(back, 0),
-             row(back, 1), row(back, 2), at.first_surface + p.surface, (at.first_corner + p.first_index) / 3,
-             moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
-             moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
-             (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u), p.index_count / 3, 0});
+        parts_.push_back({row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2),
+                          row(back, 0), row(back, 1), row(back, 2), at.first_surface + p.surface,
+                          (at.first_corner + p.first_index) / 3,
+                          moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
+                          moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
+                          // What blends shadows where it covers more than its cutoff, as if it had holes.
+                          (surface.double_sided ? kMeshDoubleSided : 0u) |
+                              (surface.mask || surface.blend ? kMeshMask : 0u) | (surface.blend ? kMeshBlend : 0u),
+                          p.index_count / 3, 0});
+        if (surface.blend) {
+            const auto from_eye = [&](vec3 v) {
+                return vec3{float(double(v.x) - eye.x), float(double(v.y) - eye.y), float(double(v.z) - eye.z)};
+            };
+            blends_.push_back({from_eye(part.bounds.min), from_eye(part.bounds.max)});
+        }
         triangles_ += p.index_count / 3;
     }
     std::vector<bool> in_sight;
@@ -291,7 +301,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         if (in_sight[i]) triangles_drawn_ += parts_[i].triangle_count;
     const auto list = [&](uint32_t& count, bool holes, bool both) {
         for (uint32_t i = 0; i < parts_.size(); ++i) {
-            if (!in_sight[i]) continue;
+            if (!in_sight[i] || (parts_[i].flags & kMeshBlend) != 0) continue;  // what blends: mesh_trace.comp
             const bool masked = (parts_[i].flags & kMeshMask) != 0, two = (parts_[i].flags & kMeshDoubleSided) != 0;
             if (masked != holes || (!holes && two != both)) continue;
             for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++count) clusters_.push_back({i, t});

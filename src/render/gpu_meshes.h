@@ -35,6 +35,8 @@ public:
     Result<void> update(const Frame& frame, const shade::CameraParams& camera);
     MeshHandles import(Graph& g) const;
     bool empty() const { return parts_.empty(); }
+    // Of parts that blend, metres from the eye.
+    const std::vector<Box3>& blends() const { return blends_; }
     uint64_t triangles() const { return triangles_; }
     uint64_t triangles_drawn() const { return triangles_drawn_; }
 
@@ -57,6 +59,7 @@ private:
     std::vector<MeshPart> parts_;
     std::vector<MeshClusterRef> clusters_;
     uint32_t one_sided_ = 0, double_sided_ = 0, masked_ = 0;
+    std::vector<Box3> blends_;
     uint64_t triangles_ = 0, triangles_drawn_ = 0;
 };
 

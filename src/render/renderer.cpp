@@ -14,8 +14,11 @@
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
+#include "render/passes/forward.h"
+#include "render/particle_bins.h"
 #include "render/passes/instances.h"
 #include "render/picture.h"
+#include "render/through_rects.h"
 #include "render/temporal.h"
 #include "rhi/create.h"
 
@@ -31,6 +34,9 @@ namespace {
 constexpr int kTileWidth = 4096;
 constexpr int kTilePixels = 1 << 21;
 constexpr int kTilePixelsOfGpu = 9 << 20;
+// Pixels whose rays may be bent at once: a buffer of them is within a binding.
+constexpr int kBentRays = 1 << 21;
+static_assert(uint64_t{kBentRays} * sizeof(FrameRay) <= rhi::kMaxStorageBinding);
 
 }  // namespace
 }  // namespace render
@@ -57,7 +63,8 @@ struct Renderer::Impl {
     };
     std::optional<Before> before;
     uint64_t taa_frame = 0;
-    OutlineCode outlined;  // of the frame
+    OutlineCode outlined;           // of the frame
+    std::vector<LineRecord> lines;  // likewise
 
     ~Impl() {
         instances.reset();
@@ -75,7 +82,7 @@ struct Renderer::Impl {
     // Brings a frame's environment image to the device.
     Result<void> bring(const Frame& frame);
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
-    // The exact path has instances in its program.
+    // The exact path has solid instances in its program.
     Result<Picture> render_merged(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                              Picture& picture);
@@ -116,11 +123,22 @@ struct Renderer::Impl {
         in.develops = !needs_whole_picture(frame.camera) || tiles_of(settings, frame.lights.size()) == 1;
         in.use = field->use(!settings.analytic);
         in.use_of_bricks = field->use(false);
-        in.has_instances = !frame.instances.empty();
+        in.has_instances =
+            std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) { return i.glass == 0; });
+        in.transparent_layers = settings.view == View::Shaded ? std::clamp(settings.transparent_layers, 0, 16) : 0;
+        in.has_glass = in.transparent_layers > 0 &&
+                       std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) {
+                           return i.glass != 0 && i.bricks->field().stats().bricks > 0;
+                       });
+        in.has_particles = settings.view == View::Shaded && !frame.particles.empty();
+        in.has_blends = in.transparent_layers > 0 && !meshes->blends().empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
+        in.has_lines = !lines.empty() && settings.view == View::Shaded && in.develops;
         return in;
     }
+    // The parts of a tile behind which something lets light through.
+    void find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const;
     void add_times(const FrameTimes& times);
     // What the device complained about, as this call's error.
     Result<void> healthy() {
@@ -181,6 +199,38 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
     }
 }
 
+void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const {
+    if (!in.has_glass && !in.has_blends) return;
+    std::vector<Box3> boxes = meshes->blends();
+    const float h = params.grid.voxel_size;
+    for (const InstanceNode& n : instances->glass_nodes())
+        if (n.instance != kNoInstance)
+            boxes.push_back({vec3{n.low_x, n.low_y, n.low_z} * h, vec3{n.high_x, n.high_y, n.high_z} * h});
+    const PixelRect tile{params.tile_x, params.tile_y, params.tile_width, params.tile_height};
+    for (const PixelRect& rect : through_rects(boxes, params.camera, tile, kBentRays)) {
+        FrameParams part = params;
+        part.tile_x = rect.x, part.tile_y = rect.y;
+        part.tile_width = rect.width, part.tile_height = rect.height;
+        if (!in.refine) part.flags &= ~kFrameRefine;
+        ThroughPart& out = in.through.emplace_back();
+        out.x = rect.x - tile.x, out.y = rect.y - tile.y;
+        out.size = {uint32_t(rect.width), uint32_t(rect.height)};
+        out.frame = g.block(part);
+        part.flags |= kFrameRays;
+        out.frame_of_rays = g.block(part);
+        LightRects rects = (part.flags & kFrameAllLights) == 0
+                               ? light_rects(frame.lights, params.camera, rect.x, rect.y, rect.width, rect.height)
+                               : all_light_rects(frame.lights.size(), rect.width, rect.height);
+        out.lights_of_tile = rects.most;
+        if (rects.rects.empty()) rects.rects.emplace_back();
+        out.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
+    }
+    if (in.through.empty()) return;
+    LightRects all = all_light_rects(frame.lights.size(), params.tile_width, params.tile_height);
+    if (all.rects.empty()) all.rects.emplace_back();
+    in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
+}
+
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                                          Picture& picture) {
     const auto inputs_on = [&](Graph& g) {
@@ -214,10 +264,37 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
             in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
             in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
         }
-        if (in.taa)
+        if (in.taa || in.has_particles)
             in.motion = g.block(motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
                                               params.width, params.height));
         in.meshes = meshes->import(g);
+        find_through(g, frame, params, in);
+        if (in.has_particles) {
+            const ParticleBins bins = particle_bins(frame.particles, params.camera, params.tile_x, params.tile_y,
+                                                    params.tile_width, params.tile_height);
+            in.particles.count = uint32_t(bins.records.size());
+            in.particles.first_level = bins.first_level;
+            in.particles.across = bins.across;
+            if (!bins.records.empty()) {
+                in.particles.records = g.upload("particles", std::span<const ParticleRecord>(bins.records));
+                in.particles.ends = g.upload("particle bins", std::span<const uint32_t>(bins.ends));
+                in.particles.numbers = g.upload("particle numbers", std::span<const uint32_t>(bins.numbers));
+            }
+        }
+        if (in.has_lines) {
+            in.lines.count = uint32_t(lines.size());
+            in.lines.lines = g.upload("debug lines", std::span<const LineRecord>(lines));
+            in.lines.params =
+                g.block(LineParams{.camera = shade::camera_params(frame.camera, params.width, params.height),
+                                   .width = params.width,
+                                   .height = params.height,
+                                   .tile_x = params.tile_x,
+                                   .tile_y = params.tile_y,
+                                   .tile_width = params.tile_width,
+                                   .tile_height = params.tile_height,
+                                   .pad_0 = 0,
+                                   .pad_1 = 0});
+        }
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -279,11 +356,12 @@ Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSe
     if (!field_of_all) return Error{"analytic: " + field_of_all.error().message, field_of_all.error().kind};
     Frame merged = frame;
     merged.field = std::move(*field_of_all);
-    merged.instances.clear();
+    std::erase_if(merged.instances, [](const Instance& i) { return i.glass == 0; });
     auto picture = render(merged, settings);
     stats.instances = int(frame.instances.size());
     // Each is one edit of the merged program, whatever it is made of.
-    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size()) - 1;
+    for (const Instance& i : frame.instances)
+        if (i.glass == 0) stats.edits += int(i.bricks->program().index.size()) - 1;
     return picture;
 }
 
@@ -299,7 +377,9 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         return Error{
             "analytic: a world of several levels is drawn from bricks; set field.levels to 1 to march its edits",
             ErrorKind::Usage};
-    if (settings.analytic && !frame.instances.empty()) return render_merged(frame, settings);
+    const auto solid = [](const Instance& i) { return i.glass == 0; };
+    if (settings.analytic && std::any_of(frame.instances.begin(), frame.instances.end(), solid))
+        return render_merged(frame, settings);
     if (settings.analytic) {
         const std::span<const sdf::Instruction> code = program.tape();
         if (std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); }))
@@ -326,13 +406,20 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     }
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
+    lines = line_records(frame.lines, frame.camera.position);
+    constexpr size_t kMostParticles = rhi::kMaxStorageBinding / sizeof(ParticleRecord);
+    if (frame.particles.size() > kMostParticles)
+        return Error{formatted("{} particles; a frame has at most {}", frame.particles.size(), kMostParticles),
+                     ErrorKind::Usage};
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
     const TileInputs switches = inputs(frame, settings);
+    if (!lines.empty() && settings.view == View::Shaded && !switches.has_lines)
+        log::warn("debug lines are not drawn: the picture is several tiles");
     if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches));
         !warm)
         return warm.error();
     params->sky = shade::sky_params(frame);
-    instances->place(frame.instances, *params);
+    instances->place(frame.instances, *params, frame.materials);
     const bool taa = settings.taa && settings.view == View::Shaded;
     if (taa && tiles_of(settings, frame.lights.size()) > 1)
         return Error{

@@ -15,7 +15,8 @@ std::shared_ptr<const model::Drawable> painted(const model::Drawable& drawable, 
         const bool two = s.double_sided;
         s = {};
         s.double_sided = two;
-        s.base_color = {m.base_color.x, m.base_color.y, m.base_color.z, 1};
+        s.base_color = {m.base_color.x, m.base_color.y, m.base_color.z, m.opacity};
+        s.blend = m.opacity < 1;
         s.metallic = m.metallic;
         s.roughness = m.roughness;
         s.emissive = m.emissive;

@@ -35,7 +35,8 @@ struct MeshPart {
     uint pad_0;
 };
 KILN_CONST uint kMeshDoubleSided = 1u;
-KILN_CONST uint kMeshMask = 2u;  // holes where alpha is less than the cutoff
+KILN_CONST uint kMeshMask = 2u;   // holes where alpha is less than the cutoff
+KILN_CONST uint kMeshBlend = 4u;  // alpha is the share that it covers
 
 // What is drawn at once: up to kMeshCluster triangles of a part, neighbours in space.
 KILN_CONST uint kMeshCluster = 64u;

@@ -12,10 +12,10 @@ const Kernel kTaa{"taa", kTaaSpv};
 
 Image motion(Graph& g, const TileInputs& in, const Image& visibility) {
     Image out = g.create("motion", {.size = in.size, .format = rhi::Format::Rgba16Float});
-    g.dispatch(
-        kMotion, in.size,
-        {g.uniform(in.frame), g.uniform(in.motion), g.read(in.rays), g.read(visibility), g.write(out),
-         g.read(in.instances ? in.instances.instances : in.rays), g.read(in.has_meshes ? in.meshes.parts : in.rays)});
+    g.dispatch(kMotion, in.size,
+               {g.uniform(in.frame), g.uniform(in.motion), g.read(in.rays), g.read(visibility), g.write(out),
+                g.read(in.instances.any() ? in.instances.instances : in.rays),
+                g.read(in.has_meshes ? in.meshes.parts : in.rays)});
     return out;
 }
 
