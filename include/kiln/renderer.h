@@ -91,6 +91,7 @@ struct EditOutline {
 struct MeshInstance {
     std::shared_ptr<const model::Drawable> model;  ///< immutable
     Transform transform, before;                   ///< world from model: now, and in the frame before (for motion)
+    std::optional<Outline> outline{};              ///< round what is seen of it, in shaded pictures
 };
 
 /// A straight line over the finished picture, for whoever looks for a fault.
@@ -142,7 +143,9 @@ struct RenderSettings {
         true;           ///< … and look through another place of each pixel every time; false: through their middles
     bool cut = false;   ///< taa: this picture follows on none before
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
-    int transparent_layers = 4;  ///< solids of glass and panes that a ray may pass, [0, 16]; those behind are not seen
+    int transparent_layers =
+        4;  ///< things of glass and panes that a ray may go through, [0, 16]; those behind are not seen
+    bool outline_hulls = false;  ///< meshes are outlined by their back faces made larger, for comparison
 };
 
 /// Pixels, top row first.

@@ -132,7 +132,8 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
             if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
             Image shown = tonemap(g, radiance, glow, exposure, in.camera);
-            if (in.outline_count > 0) shown = outline(g, in, surface.seen, shown);
+            if (in.outline_hulls) shown = draw_hulls(g, in, surface, shown);
+            if (in.outline_count > 0 || in.outlines_meshes) shown = outline(g, in, surface.seen, shown);
             shown = draw_lines(g, in, surface.depth, shown);
             out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
@@ -205,9 +206,10 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.insert(out.end(), {&kBloomDown, &kBloomUp});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
-    if (in.outline_count > 0)
-        out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
-    if (in.has_lines) out.push_back(&kLinesOver);
+    if (in.outline_count > 0) out.push_back(&specialised(kOutlineMask, in.use_of_outlines));
+    if (in.outline_count > 0 || in.outlines_meshes) out.insert(out.end(), {&kOutlineFlood, &kOutlineDraw});
+    if (in.outlines_meshes || in.outline_hulls) out.push_back(&kOutlineMeshes);
+    if (in.has_lines || in.outline_hulls) out.push_back(&kLinesOver);
     return out;
 }
 
@@ -215,6 +217,7 @@ std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
     std::vector<const RasterKernel*> out;
     if (in.has_meshes) out = {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
     if (in.has_lines) out.push_back(&kLines);
+    if (in.outline_hulls) out.push_back(&kOutlineHull);
     return out;
 }
 

@@ -230,6 +230,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     parts_.clear();
     clusters_.clear();
     blends_.clear();
+    outlined_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
     triangles_ = triangles_drawn_ = 0;
     if (frame.meshes.empty()) return {};
@@ -270,8 +271,16 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
             !ok)
             return ok;
     }
+    std::vector<uint32_t> outline_of(frame.meshes.size(), 0);  // by number of the mesh
+    for (size_t i = 0; i < frame.meshes.size(); ++i) {
+        if (!frame.meshes[i].outline) continue;
+        outlined_.push_back({.outline = *frame.meshes[i].outline, .middle = {}});
+        outline_of[i] = uint32_t(outlined_.size());
+    }
+    std::vector<Box3> boxes(outlined_.size());
     for (const MeshSet::Part& part : set.parts) {
         const Primitive& p = set.primitive(part);
+        if (const uint32_t n = outline_of[part.mesh]; n > 0) boxes[n - 1] = box_union(boxes[n - 1], part.bounds);
         const Model& at = places_[part.model];
         Matrix place = part.place, before = part.before;
         for (Matrix* m : {&place, &before}) (*m)[12] -= eye.x, (*m)[13] -= eye.y, (*m)[14] -= eye.z;
@@ -286,7 +295,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
                           // What blends shadows where it covers more than its cutoff, as if it had holes.
                           (surface.double_sided ? kMeshDoubleSided : 0u) |
                               (surface.mask || surface.blend ? kMeshMask : 0u) | (surface.blend ? kMeshBlend : 0u),
-                          p.index_count / 3, 0});
+                          p.index_count / 3, outline_of[part.mesh]});
         if (surface.blend) {
             const auto from_eye = [&](vec3 v) {
                 return vec3{float(double(v.x) - eye.x), float(double(v.y) - eye.y), float(double(v.z) - eye.z)};
@@ -310,6 +319,18 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     list(one_sided_, false, false);
     list(double_sided_, false, true);
     list(masked_, true, true);
+    for (uint32_t n = 0; n < outlined_.size(); ++n) {
+        MeshOutline& o = outlined_[n];
+        if (boxes[n].empty()) continue;
+        const vec3 middle = boxes[n].center();
+        o.middle = {float(double(middle.x) - eye.x), float(double(middle.y) - eye.y), float(double(middle.z) - eye.z)};
+        o.first_cluster = uint32_t(clusters_.size());
+        for (uint32_t i = 0; i < parts_.size(); ++i) {
+            if (!in_sight[i] || parts_[i].outline != n + 1) continue;
+            for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++o.clusters)
+                clusters_.push_back({i, t});
+        }
+    }
     return {};
 }
 
@@ -329,6 +350,7 @@ MeshHandles GpuMeshes::import(Graph& g) const {
     out.one_sided = one_sided_;
     out.double_sided = double_sided_;
     out.masked = masked_;
+    out.outlined = outlined_;
     return out;
 }
 

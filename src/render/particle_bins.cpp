@@ -47,14 +47,28 @@ ParticleBins particle_bins(std::span<const Particle> particles, const shade::Cam
         const Particle& p = particles[i];
         const vec3 at = p.position - eye;
         const float square = dot(at, at);
-        if (!(square < 1e18f) || !(p.radius > 0) || !(p.opacity > 0) || dot(at, normalize(forward)) <= -p.radius) continue;
+        if (!(square < 1e18f) || !(p.radius > 0) || !(p.opacity > 0) || dot(at, normalize(forward)) <= -p.radius)
+            continue;
         order.push_back({square, i});
     }
     const auto record_of = [&](const Particle& p) {
         const vec3 at = p.position - eye, moved = p.before - p.position;
-        return ParticleRecord{at.x,         at.y,      at.z,      p.radius,     p.color.x,    p.color.y,
-                              p.color.z,    std::min(p.opacity, 1.0f), p.emissive.x, p.emissive.y, p.emissive.z,
-                              moved.x,      moved.y,   moved.z,   0,            0};
+        return ParticleRecord{at.x,
+                              at.y,
+                              at.z,
+                              p.radius,
+                              p.color.x,
+                              p.color.y,
+                              p.color.z,
+                              std::min(p.opacity, 1.0f),
+                              p.emissive.x,
+                              p.emissive.y,
+                              p.emissive.z,
+                              moved.x,
+                              moved.y,
+                              moved.z,
+                              0,
+                              0};
     };
     std::sort(order.begin(), order.end(), [&](const Key& a, const Key& b) {
         if (a.distance != b.distance) return a.distance < b.distance;
@@ -78,7 +92,8 @@ ParticleBins particle_bins(std::span<const Particle> particles, const shade::Cam
     std::vector<uint32_t> counts(bins, 0);
     const auto each_bin = [&](const Place& p, const auto& visit) {
         for (int y = p.y0; y <= p.y1; ++y)
-            for (int x = p.x0; x <= p.x1; ++x) visit(out.first_level[p.level] + uint32_t(y) * out.across[p.level] + uint32_t(x));
+            for (int x = p.x0; x <= p.x1; ++x)
+                visit(out.first_level[p.level] + uint32_t(y) * out.across[p.level] + uint32_t(x));
     };
     for (const Key& key : order) {
         const Particle& p = particles[key.index];
@@ -110,7 +125,8 @@ ParticleBins particle_bins(std::span<const Particle> particles, const shade::Cam
     uint32_t sum = 0;
     for (uint32_t bin = 0; bin < bins; ++bin) out.ends[bin] = std::exchange(sum, sum + counts[bin]);  // where it begins
     out.numbers.resize(sum);
-    for (uint32_t i = 0; i < places.size(); ++i) each_bin(places[i], [&](uint32_t bin) { out.numbers[out.ends[bin]++] = i; });
+    for (uint32_t i = 0; i < places.size(); ++i)
+        each_bin(places[i], [&](uint32_t bin) { out.numbers[out.ends[bin]++] = i; });
     return out;
 }
 

@@ -16,8 +16,8 @@ namespace kiln::render {
 
 struct ParticleBins {
     std::vector<ParticleRecord> records;  // nearest first; of equals the same whatever the order they came in
-    std::vector<uint32_t> ends;           // of each bin's list in `numbers`, all bins of all levels; the first begins at 0
-    std::vector<uint32_t> numbers;        // of records, ascending in each bin
+    std::vector<uint32_t> ends;     // of each bin's list in `numbers`, all bins of all levels; the first begins at 0
+    std::vector<uint32_t> numbers;  // of records, ascending in each bin
     std::array<uint32_t, size_t(kParticleLevels)> first_level{}, across{};
 };
 

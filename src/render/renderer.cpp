@@ -134,6 +134,10 @@ struct Renderer::Impl {
         in.has_blends = in.transparent_layers > 0 && !meshes->blends().empty();
         in.use_of_instances = instances->use();
         in.has_meshes = !meshes->empty();
+        const bool outlines = settings.view == View::Shaded && !meshes->outlined().empty() &&
+                              tiles_of(settings, frame.lights.size()) == 1;
+        in.outlines_meshes = outlines && !settings.outline_hulls;
+        in.outline_hulls = outlines && settings.outline_hulls;
         in.has_lines = !lines.empty() && settings.view == View::Shaded && in.develops;
         return in;
     }
@@ -260,8 +264,22 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        if (in.outline_count > 0 || in.outlines_meshes) {
+            std::vector<OutlineRecord> records = outlined.records;
+            for (const MeshOutline& o : meshes->outlined()) {
+                records.push_back({.red = o.outline.color.x,
+                                   .green = o.outline.color.y,
+                                   .blue = o.outline.color.z,
+                                   .width_px = o.outline.width_px,
+                                   .code_first = 0,
+                                   .code_count = 0,
+                                   .blend = 0,
+                                   .paints = 0});
+                in.widest_outline = std::max(in.widest_outline, o.outline.width_px);
+            }
+            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(records));
+        }
         if (in.outline_count > 0) {
-            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
             in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
         }
         if (in.taa || in.has_particles)

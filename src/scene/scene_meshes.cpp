@@ -66,7 +66,7 @@ std::vector<MeshInstance> SceneMeshes::instances(const SceneData& scene) const {
     std::vector<MeshInstance> out;
     for (size_t i = 0; i < models.size(); ++i)
         if (models[i] && !scene.meshes[i].hidden)
-            out.push_back({models[i], scene.meshes[i].transform, scene.meshes[i].transform});
+            out.push_back({models[i], scene.meshes[i].transform, scene.meshes[i].transform, scene.meshes[i].outline});
     return out;
 }
 

@@ -16,7 +16,9 @@ struct LinesGpu : testing::Test {
         renderer = renderer_or_skip();
         if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
         // A ball in the dark.
-        field::worlds::World world{"ball", {field::worlds::edit(Sphere{0.5f})}, {.voxel_size = 0.05f, .bounds = {{-0.7f, -0.7f, -0.7f}, {0.7f, 0.7f, 0.7f}}}};
+        field::worlds::World world{"ball",
+                                   {field::worlds::edit(Sphere{0.5f})},
+                                   {.voxel_size = 0.05f, .bounds = {{-0.7f, -0.7f, -0.7f}, {0.7f, 0.7f, 0.7f}}}};
         frame.field = world.field();
         frame.materials.resize(1);
         frame.materials[0].base_color = {0, 0, 0};
@@ -38,7 +40,9 @@ struct LinesGpu : testing::Test {
     Point seen(dvec3 p) const {
         const shade::CameraParams c = shade::camera_params(frame.camera, kWidth, kHeight);
         const double d[3] = {p.x - double(c.eye.x), p.y - double(c.eye.y), p.z - double(c.eye.z)};
-        const auto along = [&](const vec4& v) { return (d[0] * v.x + d[1] * v.y + d[2] * v.z) / (double(v.x) * v.x + double(v.y) * v.y + double(v.z) * v.z); };
+        const auto along = [&](const vec4& v) {
+            return (d[0] * v.x + d[1] * v.y + d[2] * v.z) / (double(v.x) * v.x + double(v.y) * v.y + double(v.z) * v.z);
+        };
         const double ahead = along(c.forward);
         return {(along(c.right) / ahead + 1) * kWidth / 2, (1 - along(c.up) / ahead) * kHeight / 2};
     }

@@ -35,11 +35,13 @@ struct ParticlesGpu : testing::Test {
     void SetUp() override {
         renderer = renderer_or_skip();
         if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
-        field::worlds::World world{"ball", {edit(Sphere{0.5f})}, {.voxel_size = 0.05f, .bounds = {{-0.7f, -0.7f, -0.7f}, {0.7f, 0.7f, 0.7f}}}};
+        field::worlds::World world{
+            "ball", {edit(Sphere{0.5f})}, {.voxel_size = 0.05f, .bounds = {{-0.7f, -0.7f, -0.7f}, {0.7f, 0.7f, 0.7f}}}};
         frame.field = world.field();
         frame.materials.resize(2);
         frame.environment = Environment{.color = {0.5f, 0.4f, 0.3f}};
-        frame.lights = {Light{.illuminance = 2}, Light{.kind = Light::Kind::Point, .position = {1, 2, 1}, .intensity = 3}};
+        frame.lights = {Light{.illuminance = 2},
+                        Light{.kind = Light::Kind::Point, .position = {1, 2, 1}, .intensity = 3}};
         frame.camera.position = {0.3f, 0.2f, 4};
         frame.camera.tone_map = ToneMap::None;
     }
@@ -70,14 +72,16 @@ vec3 over(const Frame& frame, const Picture& bare, int x, int y) {
         const double covers = double(p->opacity) * inside * inside * seen;
         vec3 light = frame.environment->color;
         for (const Light& l : frame.lights)
-            light = light + shade::sample_light(shade::light_record(l), p->position).illuminance * (0.25f / 3.14159265f);
+            light =
+                light + shade::sample_light(shade::light_record(l), p->position).illuminance * (0.25f / 3.14159265f);
         const vec3 c = p->color * light + p->emissive;
         const double color[3] = {c.x, c.y, c.z};
         for (size_t k = 0; k < 3; ++k) sum[k] += left * covers * color[k];
         left *= 1 - covers;
     }
     const float* c = &bare.rgba[at * 4];
-    return {float(sum[0] + left * double(c[0])), float(sum[1] + left * double(c[1])), float(sum[2] + left * double(c[2]))};
+    return {float(sum[0] + left * double(c[0])), float(sum[1] + left * double(c[1])),
+            float(sum[2] + left * double(c[2]))};
 }
 
 TEST_F(ParticlesGpu, CoverWhatIsBehindThemFromNearToFar) {
@@ -117,7 +121,11 @@ TEST_F(ParticlesGpu, TheirOrderInTheListChangesNoByte) {
 }
 
 TEST_F(ParticlesGpu, BehindClearGlassAreSeenThroughIt) {
-    frame.particles = {Particle{.position = {0.2f, 0.9f, -1}, .before = {}, .radius = 0.5f, .color = {0, 0, 0}, .opacity = 1,
+    frame.particles = {Particle{.position = {0.2f, 0.9f, -1},
+                                .before = {},
+                                .radius = 0.5f,
+                                .color = {0, 0, 0},
+                                .opacity = 1,
                                 .emissive = {2, 0, 0}}};
     const Picture open = picture();
     auto set = rhi::must(field::BrickSet::make(field::worlds::compiled({edit(Box{{1.5f, 1.5f, 0.05f}})}), 0.03f));
@@ -128,7 +136,8 @@ TEST_F(ParticlesGpu, BehindClearGlassAreSeenThroughIt) {
     const Picture behind = picture();
     frame.instances[0].pose.position.z = frame.instances[0].before.position.z = -2;
     const Picture before = picture();
-    const vec2 at = shade::camera_pixel(shade::camera_params(frame.camera, kWidth, kHeight), frame.particles[0].position - frame.camera.position);
+    const vec2 at = shade::camera_pixel(shade::camera_params(frame.camera, kWidth, kHeight),
+                                        frame.particles[0].position - frame.camera.position);
     const size_t pixel = (size_t(at.y) * kWidth + size_t(at.x)) * 4;
     EXPECT_NEAR(open.rgba[pixel], 2.0f, 0.05f);
     EXPECT_NEAR(before.rgba[pixel], 2.0f, 0.05f);
@@ -156,8 +165,10 @@ TEST(Particles, AreInEveryBinThatShowsThem) {
             std::vector<char> listed(bins.records.size());
             for (size_t level = 0; level < size_t(kParticleLevels); ++level) {
                 const uint32_t side = uint32_t(kParticleBin) << (2 * level);
-                const uint32_t bin = bins.first_level[level] + uint32_t(y) / side * bins.across[level] + uint32_t(x) / side;
-                for (uint32_t n = bin == 0 ? 0 : bins.ends[bin - 1]; n < bins.ends[bin]; ++n) listed[bins.numbers[n]] = 1;
+                const uint32_t bin =
+                    bins.first_level[level] + uint32_t(y) / side * bins.across[level] + uint32_t(x) / side;
+                for (uint32_t n = bin == 0 ? 0 : bins.ends[bin - 1]; n < bins.ends[bin]; ++n)
+                    listed[bins.numbers[n]] = 1;
             }
             for (const Particle& p : particles) {
                 const vec3 m = p.position - camera.position;
@@ -166,7 +177,8 @@ TEST(Particles, AreInEveryBinThatShowsThem) {
                 ++seen;
                 bool found = false;
                 for (size_t i = 0; i < bins.records.size() && !found; ++i)
-                    found = listed[i] != 0 && bins.records[i].radius == p.radius && bins.records[i].opacity == p.opacity;
+                    found =
+                        listed[i] != 0 && bins.records[i].radius == p.radius && bins.records[i].opacity == p.opacity;
                 EXPECT_TRUE(found) << "round " << round << " at " << x << ", " << y;
             }
         }

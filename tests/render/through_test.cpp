@@ -30,7 +30,9 @@ Instance glass_of(Shape shape, vec3 position, uint32_t material, float voxel = 0
 
 // A small black ball far below in a sky that shines the same from everywhere.
 Frame bright_frame() {
-    field::worlds::World world{"speck", {edit(Sphere{0.1f}, {0, -9, 0})}, {.voxel_size = 0.05f, .bounds = {{-0.2f, -9.2f, -0.2f}, {0.2f, -8.8f, 0.2f}}}};
+    field::worlds::World world{"speck",
+                               {edit(Sphere{0.1f}, {0, -9, 0})},
+                               {.voxel_size = 0.05f, .bounds = {{-0.2f, -9.2f, -0.2f}, {0.2f, -8.8f, 0.2f}}}};
     Frame frame;
     frame.field = world.field();
     frame.materials.resize(4);
@@ -192,6 +194,46 @@ TEST_F(ThroughGpu, PanesCoverTheirShareFromFarToNear) {
     EXPECT_NEAR(got.z, wanted.z, 0.01f);
 }
 
+// Dark glass goes over a bright sky: where it was three frames ago the sky is as bright as ever, and where it is it is as dark.
+TEST_F(ThroughGpu, MovingGlassLeavesNoTrail) {
+    Frame frame = bright_frame();
+    frame.materials[1] = {.roughness = 0.3f, .opacity = 0.02f, .ior = 1.1f, .attenuation_color = {0.02f, 0.05f, 0.1f}};
+    frame.materials[1].attenuation_distance = 0.3f;
+    frame.instances = {glass_of(Box{{0.4f, 0.5f, 0.2f}}, {-1, 0, 0}, 1)};
+    const RenderSettings settings{.width = 64, .height = 48, .taa = true};
+    RenderSettings fresh = settings;
+    fresh.cut = true;
+    std::vector<Picture> pictures;
+    for (int i = 0; i < 10; ++i) {
+        Instance& glass = frame.instances[0];
+        glass.before = glass.pose;
+        glass.pose.position.x += 0.15f;
+        pictures.push_back(rhi::must(renderer->render(frame, settings)));
+    }
+    const Picture again = rhi::must(renderer->render(frame, fresh));
+    const Picture& last = pictures.back();
+    const shade::CameraParams eye = shade::camera_params(frame.camera, last.width, last.height);
+    const auto column = [&](float x) {
+        return int(shade::camera_pixel(eye, vec3{x, 0, 0.2f} - frame.camera.position).x);
+    };
+    const float now = frame.instances[0].pose.position.x, left = now - 0.4f, right = now + 0.4f;
+    int behind = 0, on = 0;
+    for (int x = 1; x < last.width - 1; ++x) {
+        const size_t at = size_t(last.height / 2 * last.width + x) * 4;
+        if (x < column(left - 0.45f - 0.05f)) {  // left three frames ago
+            EXPECT_NEAR(last.rgba[at], 1, 0.02f) << x;
+            ++behind;
+        }
+        if (x > column(left + 0.1f) && x < column(right - 0.1f)) {
+            EXPECT_NEAR(last.rgba[at], again.rgba[at], 0.05f) << x;
+            EXPECT_LT(last.rgba[at], 0.5f) << x;
+            ++on;
+        }
+    }
+    EXPECT_GT(behind, 5);
+    EXPECT_GT(on, 3);
+}
+
 TEST(Glass, ReflectsAsFresnelSays) {
     // Right angles; Brewster's angle, where only one polarisation is left; grazing; past the critical angle.
     EXPECT_NEAR(shade::dielectric_reflectance(1, 1 / 1.5f), 0.04f, 1e-6f);
@@ -237,7 +279,8 @@ TEST(Glass, OnTheScreenIsWithinItsParts) {
             ++seen;
             bool found = false;
             for (const PixelRect& r : parts)
-                found = found || (int(at.x) >= r.x && int(at.x) < r.x + r.width && int(at.y) >= r.y && int(at.y) < r.y + r.height);
+                found = found || (int(at.x) >= r.x && int(at.x) < r.x + r.width && int(at.y) >= r.y &&
+                                  int(at.y) < r.y + r.height);
             EXPECT_TRUE(found) << at.x << ", " << at.y;
         }
     }

@@ -6,10 +6,10 @@
 
 namespace kiln::render {
 
-extern const RasterKernel kLines;
-extern const Kernel kLinesOver;
-extern const Kernel kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend, kThroughEnd, kThroughFront, kMeshTrace,
-    kShadowGlass;
+extern const RasterKernel kLines, kOutlineHull;
+extern const Kernel kLinesOver, kOutlineMeshes;
+extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend,
+    kThroughEnd, kThroughFront, kMeshTrace, kShadowGlass;
 extern const Kernel kParticles, kParticlesLight, kParticlesLightImage;
 
 // What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.
@@ -28,6 +28,13 @@ void through_kernels(const TileInputs& in, std::vector<const Kernel*>& out);
 // Radiance with particles. With taa, depth and motion are theirs where they hide more than half of what is behind.
 void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Front& front, Image& radiance,
                     Image& motion);
+
+// Meshes with an outline into the mask; their records follow `records_before` others.
+void mark_meshes(Graph& g, const TileInputs& in, const Image& visibility, uint32_t records_before, OutlineMask& mask);
+// The finished picture with outlines of meshes by a stencil and larger hulls; see outline_hull.vert.
+Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const Image& shown);
+// The finished picture with something over it: colour times share, and share.
+Image lay_over(Graph& g, const TileInputs& in, const Image& drawn, const Image& shown);
 
 // As kernels see them, counted from the eye; those that are not finite are left out.
 std::vector<LineRecord> line_records(std::span<const DebugLine> lines, vec3 eye);

@@ -21,8 +21,7 @@ constexpr rhi::ColorTarget kOver[] = {{.format = rhi::Format::Rgba16Float,
 
 }  // namespace
 
-const RasterKernel kLines{
-    .name = "debug lines", .vertex = kLinesVertSpv, .fragment = kLinesFragSpv, .colors = kOver};
+const RasterKernel kLines{.name = "debug lines", .vertex = kLinesVertSpv, .fragment = kLinesFragSpv, .colors = kOver};
 const Kernel kLinesOver{"debug lines over", kLinesOverSpv};
 
 std::vector<LineRecord> line_records(std::span<const DebugLine> lines, vec3 eye) {
@@ -52,6 +51,10 @@ Image draw_lines(Graph& g, const TileInputs& in, const Image& depth, const Image
     const DrawCall call{.vertices = 6, .instances = in.lines.count};
     g.draw(kLines, {.colors = {{.image = &drawn, .load = rhi::Load::Clear}}},
            {g.uniform(in.lines.params), g.read(in.lines.lines), g.read(depth)}, {&call, 1});
+    return lay_over(g, in, drawn, shown);
+}
+
+Image lay_over(Graph& g, const TileInputs& in, const Image& drawn, const Image& shown) {
     Image out = g.create("shown with lines", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
     g.dispatch(kLinesOver, in.size, {g.read(shown), g.read(drawn), g.write(out)},
                LinePush{int(in.size.width), int(in.size.height)});

@@ -26,10 +26,10 @@ struct ParticleRecord {
 struct ParticlePush {
     int width, height;
     uint count;
-    uint first_level[kParticleLevels];   // of a level's bins in the table of ends
-    uint across[kParticleLevels];        // bins in a row
-    uint behind;  // 1: there is something transparent, that hides particles behind it in part
-    uint moves;   // 1: what they move is told
+    uint first_level[kParticleLevels];  // of a level's bins in the table of ends
+    uint across[kParticleLevels];       // bins in a row
+    uint behind;                        // 1: there is something transparent, that hides particles behind it in part
+    uint moves;                         // 1: what they move is told
     uint pad_0;
 };
 

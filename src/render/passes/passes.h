@@ -113,6 +113,8 @@ struct TileInputs {
     bool has_blends = false;  // likewise of meshes
     int transparent_layers = 0;
     std::vector<ThroughPart> through;
+    bool outlines_meshes = false;  // their records follow those of edits
+    bool outline_hulls = false;    // … or are not used: see draw_hulls()
     bool has_particles = false;
     ParticleHandles particles;
     Buffer all_light_rects;  // LightRect a light, all of any picture; where `through` is not empty

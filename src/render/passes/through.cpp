@@ -5,6 +5,7 @@
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
 
+#include "shaders/march_glass.spv.h"
 #include "shaders/mesh_trace.spv.h"
 #include "shaders/shadow_glass.spv.h"
 #include "shaders/through_begin.spv.h"
@@ -17,6 +18,7 @@
 
 namespace kiln::render {
 
+const Kernel kMarchGlass{"march glass", kMarchGlassSpv};
 const Kernel kThroughBegin{"through begin", kThroughBeginSpv};
 const Kernel kThroughLayer{"through layer", kThroughLayerSpv};
 const Kernel kThroughSurface{"through surface", kThroughSurfaceSpv};
@@ -34,30 +36,36 @@ constexpr rhi::SamplerDesc kTrilinear{.mip = rhi::Filter::Linear, .address = rhi
 Image trace_meshes(Graph& g, const TileInputs& in, const Image& visibility, bool through) {
     const MeshHandles& m = in.meshes;
     Image out = g.create("visibility with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),     g.read(m.parts), g.read(m.corners), g.read(m.vertices),
-                          g.read(m.surfaces),  g.read(m.nodes), g.read(visibility), g.write(out)};
+    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),    g.read(m.parts),
+                          g.read(m.corners),   g.read(m.vertices), g.read(m.surfaces),
+                          g.read(m.nodes),     g.read(visibility), g.write(out)};
     for (const Image& page : m.pages) uses.push_back(g.read(page));
     uses.push_back(g.sampler(kTrilinear));
-    g.dispatch(kMeshTrace, in.size, uses, MeshTracePush{.through = through ? 1u : 0u, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0});
+    g.dispatch(kMeshTrace, in.size, uses,
+               MeshTracePush{.through = through ? 1u : 0u, .pad_0 = 0, .pad_1 = 0, .pad_2 = 0});
     return out;
 }
 
 // What is solid along rays that come from a buffer.
-Image solid_seen_along(Graph& g, const TileInputs& in) {
+Image fields_along(Graph& g, const TileInputs& in) {
     Visibility seen = march(g, in);
     march_instances(g, in, seen);
-    return in.has_meshes ? trace_meshes(g, in, seen.words, false) : seen.words;
+    return seen.words;
+}
+
+Image solid_seen_along(Graph& g, const TileInputs& in) {
+    const Image words = fields_along(g, in);
+    return in.has_meshes ? trace_meshes(g, in, words, false) : words;
 }
 
 struct Solid {
     Image seen, light;
 };
 Solid solid_along(Graph& g, const TileInputs& in) {
-    Visibility seen = march(g, in);
-    march_instances(g, in, seen);
-    Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
-    if (in.refine) refine_instances(g, in, seen.words, refined);
-    Image words = seen.words;
+    const Image seen = fields_along(g, in);
+    Image refined = in.refine ? refine(g, in, seen) : seen;
+    if (in.refine) refine_instances(g, in, seen, refined);
+    Image words = seen;
     if (in.has_meshes) words = trace_meshes(g, in, words, false);
     Surface surface = resolve(g, in, words, refined);
     resolve_instances(g, in, words, refined, surface);
@@ -76,18 +84,26 @@ struct Layer {
 Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Image& carried, const ThroughPush& push) {
     TileInputs of_glass = in;
     of_glass.instances = in.instances.of_glass();
-    Visibility nearest{solid, {}};
-    march_instances(g, of_glass, nearest);
-    if (in.has_blends) nearest.words = trace_meshes(g, in, nearest.words, true);
+    Image nearest = solid;
+    if (const InstanceHandles& i = of_glass.instances) {
+        nearest = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+        g.dispatch(
+            kMarchGlass, in.size,
+            {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
+             g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(nearest)},
+            InstancePush{.node_count = i.node_count, .first_light = 0, .pad_0 = 0, .pad_1 = 0});
+    }
+    if (in.has_blends) nearest = trace_meshes(g, in, nearest, true);
     Layer out;
     Image found = g.create("through found", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.seen = g.create("through seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.words = g.create("through surface", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.depth = g.create("through depth", {.size = in.size, .format = rhi::Format::R32Float});
-    g.dispatch(kThroughLayer, in.size,
-               {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(nearest.words),
-                g.read(carried), g.write(found), g.write(out.surface.seen), g.write(out.surface.words), g.write(out.surface.depth)},
-               push);
+    g.dispatch(
+        kThroughLayer, in.size,
+        {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(nearest), g.read(carried),
+         g.write(found), g.write(out.surface.seen), g.write(out.surface.words), g.write(out.surface.depth)},
+        push);
     if (of_glass.instances) {
         Image refined = found;
         if (in.refine) {
@@ -116,8 +132,14 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
     in.frame = part.frame;
     in.light_rects = part.light_rects;
     in.lights_of_tile = part.lights_of_tile;
-    ThroughPush push{.from_x = part.x, .from_y = part.y, .width = int(part.size.width), .height = int(part.size.height),
-                     .passed = 0, .last = 0, .pad_0 = 0, .pad_1 = 0};
+    ThroughPush push{.from_x = part.x,
+                     .from_y = part.y,
+                     .width = int(part.size.width),
+                     .height = int(part.size.height),
+                     .passed = 0,
+                     .last = 0,
+                     .pad_0 = 0,
+                     .pad_1 = 0};
     Solid solid;
     solid.seen = g.create("through solid", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     solid.light = g.create("through solid light", {.size = in.size, .format = rhi::Format::Rgba16Float});
@@ -147,23 +169,22 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
             inside.frame = part.frame_of_rays;
             seen_inside = solid_seen_along(g, inside);
         }
-        g.dispatch(kThroughBend, in.size,
-                   {g.uniform(in.frame), g.read(in.rays), g.read(or_any(i.instances, in)), g.read(or_any(i.sets, in)),
-                    g.read(or_any(i.cells, in)), g.read(or_any(i.glass, in)),
-                    g.read(distances), g.read(layer.surface.seen), g.read(layer.surface.words),
-                    g.read(layer.light), g.read(solid.light), g.read(carried), g.read(sum), g.read(inside.rays),
-                    g.read(seen_inside), g.write(rays),
-                    g.write(carried_now), g.write(sum_now)},
-                   push);
+        g.dispatch(
+            kThroughBend, in.size,
+            {g.uniform(in.frame), g.read(in.rays), g.read(or_any(i.instances, in)), g.read(or_any(i.sets, in)),
+             g.read(or_any(i.cells, in)), g.read(or_any(i.glass, in)), g.read(distances), g.read(layer.surface.seen),
+             g.read(layer.surface.words), g.read(layer.light), g.read(solid.light), g.read(carried), g.read(sum),
+             g.read(inside.rays), g.read(seen_inside), g.write(rays), g.write(carried_now), g.write(sum_now)},
+            push);
         carried = carried_now;
         sum = sum_now;
         if (passed == 0 && wants_front(tile)) {
             push.passed = 1;  // over what is there
-            g.dispatch(kThroughFront, in.size,
-                       {g.read(layer.surface.seen), g.read(layer.surface.depth), g.read(sum), g.read(carried),
-                        g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light),
-                        g.write(front.left)},
-                       push);
+            g.dispatch(
+                kThroughFront, in.size,
+                {g.read(layer.surface.seen), g.read(layer.surface.depth), g.read(sum), g.read(carried),
+                 g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light), g.write(front.left)},
+                push);
         }
         in.rays = rays;
         in.frame = part.frame_of_rays;
@@ -183,13 +204,19 @@ Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image
         front.surface.depth = g.create("front depth", {.size = in.size, .format = rhi::Format::R32Float});
         front.light = g.create("front light", {.size = in.size, .format = rhi::Format::Rgba16Float});
         front.left = g.create("front left", {.size = in.size, .format = rhi::Format::Rgba16Float});
-        const ThroughPush all{.from_x = 0, .from_y = 0, .width = int(in.size.width), .height = int(in.size.height),
-                              .passed = 0, .last = 0, .pad_0 = 0, .pad_1 = 0};
-        g.dispatch(kThroughFront, in.size,
-                   {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance),
-                    g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light),
-                    g.write(front.left)},
-                   all);
+        const ThroughPush all{.from_x = 0,
+                              .from_y = 0,
+                              .width = int(in.size.width),
+                              .height = int(in.size.height),
+                              .passed = 0,
+                              .last = 0,
+                              .pad_0 = 0,
+                              .pad_1 = 0};
+        g.dispatch(
+            kThroughFront, in.size,
+            {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance),
+             g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light), g.write(front.left)},
+            all);
     }
     for (const ThroughPart& part : in.through) draw_part(g, in, part, surface, radiance, front);
     return front;
@@ -205,8 +232,8 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
     g.dispatch(kShadowGlass, in.size,
                {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(light_masks), g.read(i.instances),
                 g.read(i.sets), g.read(i.glass_nodes), g.read(i.cells), g.read(in.field.tables),
-                g.read(in.field.distances), g.read(visibility), g.read(surface.words), g.read(fractions),
-                g.write(left), g.write(tints[0]), g.write(tints[1])},
+                g.read(in.field.distances), g.read(visibility), g.read(surface.words), g.read(fractions), g.write(left),
+                g.write(tints[0]), g.write(tints[1])},
                InstancePush{.node_count = i.glass_node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0});
     fractions = left;
     return tints;
@@ -214,14 +241,14 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
 
 void through_kernels(const TileInputs& in, std::vector<const Kernel*>& out) {
     if (!in.has_glass && !in.has_blends) return;
-    out.insert(out.end(), {&kThroughBegin, &kThroughLayer, &kThroughSurface, &kThroughEnter, &kThroughBend, &kThroughEnd});
+    out.insert(out.end(),
+               {&kThroughBegin, &kThroughLayer, &kThroughSurface, &kThroughEnter, &kThroughBend, &kThroughEnd});
     if (in.taa || in.has_particles) out.push_back(&kThroughFront);
     if (in.has_meshes) out.push_back(&kMeshTrace);
     if (!in.has_glass) return;
     out.push_back(&kShadowGlass);
-    TileInputs of_glass = in;
-    of_glass.has_instances = true;
-    instance_kernels(of_glass, true, out);
+    out.insert(out.end(), {&kMarchGlass, &kResolveInstances});
+    if (in.refine) out.push_back(&specialised(kRefineInstances, in.use_of_instances));
 }
 
 }  // namespace kiln::render
