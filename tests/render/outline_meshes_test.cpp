@@ -26,7 +26,8 @@ struct OutlineMeshesGpu : testing::Test {
     }
     // Red of each pixel.
     std::vector<float> drawn(bool hulls) {
-        const Picture p = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .outline_hulls = hulls}));
+        const Picture p =
+            rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .outline_hulls = hulls}));
         std::vector<float> out;
         for (size_t i = 0; i < p.srgb.size(); i += 4) out.push_back(shade::linear_from_srgb(float(p.srgb[i]) / 255));
         return out;

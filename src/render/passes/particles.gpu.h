@@ -9,7 +9,7 @@ namespace kiln::render {
 #endif
 
 // Bins are squares of kParticleBin << (2 level) pixels; a particle is in those of the level where it meets few.
-KILN_CONST int kParticleBin = 16;
+KILN_CONST int kParticleBin = 8;
 KILN_CONST int kParticleLevels = 5;
 
 // Counted from the eye, metres.

@@ -53,15 +53,17 @@ vec3 unit_or(vec3 v, vec3 other) {
 struct Way {
     vec3 at;
     vec3 direction;
-    float inside;  // voxels on the way
-    float share;
-    bool stopped;  // by something solid inside
+    float inside;     // voxels on the way
+    float last;       // of them since it was thrown back last
+    float reflected;  // share that is thrown back where it leaves
+    bool caught;      // it does not
+    bool stopped;     // by something solid inside
 };
 
 // Inside an object, from where a ray has come in; its first stretch goes no farther than t_solid.
 Way through_glass(InstanceRecord instance, GlassRecord g, vec3 at, vec3 direction, float t_solid) {
     float off = kOffVoxels / instance.voxels;
-    Way way = Way(at, direction, 0.0, 1.0, false);
+    Way way = Way(at, direction, 0.0, 0.0, 0.0, false, false);
     for (int i = 0; i < kMostTurns; ++i) {
         MarchHit hit = field_march(here.grid, object_ray(instance, way.at, way.direction), 0.0, kFarVoxels, true);
         float t = hit.t / instance.voxels;
@@ -73,6 +75,7 @@ Way through_glass(InstanceRecord instance, GlassRecord g, vec3 at, vec3 directio
         if (hit.state == kMarchMiss) return way;
         way.at += way.direction * t;
         way.inside += t;
+        way.last = t;
         if (hit.state != kMarchHit) return way;  // past an edge too thin for a voxel
         // From inside, distances grow inwards.
         vec3 inwards = towards(unit_or(out_of_object(instance, dual_gradient(hit.slot, hit.cell, vec3(hit.voxel) + hit.p)), -way.direction), way.direction);
@@ -80,13 +83,13 @@ Way through_glass(InstanceRecord instance, GlassRecord g, vec3 at, vec3 directio
         if (reflected < 1.0) {
             way.direction = refracted(way.direction, inwards, g.ior);
             way.at -= inwards * off;
-            way.share *= 1.0 - reflected;
+            way.reflected = reflected;
             return way;
         }
         way.direction = reflect(way.direction, inwards);
         way.at += inwards * off;
     }
-    way.share = 0.0;  // caught
+    way.caught = true;
     return way;
 }
 
@@ -130,7 +133,11 @@ void main() {
                 at = way.at;
                 direction = way.direction;
                 if (way.stopped) carried.a = kRayEnds;
-                carried.rgb *= enters * way.share * exp(-vec3(g.absorbed_red, g.absorbed_green, g.absorbed_blue) * (way.inside * frame.grid.voxel_size));
+                vec3 absorbed = vec3(g.absorbed_red, g.absorbed_green, g.absorbed_blue) * frame.grid.voxel_size;
+                // What is thrown back where the ray leaves crosses the object again, and leaves in part, and so on: all of that is taken for as
+                // bright as what is seen along the ray. So glass keeps no light to itself.
+                vec3 leaves = (1.0 - way.reflected) / (1.0 - way.reflected * exp(-absorbed * way.last));
+                carried.rgb *= way.caught ? vec3(0.0) : enters * leaves * exp(-absorbed * way.inside);
             } else {
                 float opacity = float(words.x >> 24u) / 255.0;
                 sum.rgb += carried.rgb * opacity * light;
