@@ -90,6 +90,8 @@ function(kiln_tests)
             set(limit 300)
             if(label MATCHES "slow")
                 set(limit 1500)
+            elseif(KILN_SANITIZE)
+                set(limit 900)
             endif()
             gtest_discover_tests(${target} TEST_FILTER "${filter}" TEST_PREFIX "${name}." TEST_LIST ${target}_${label}
                 DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${label} TIMEOUT ${limit})

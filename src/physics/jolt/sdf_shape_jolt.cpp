@@ -2,6 +2,7 @@
 
 #include "physics/jolt/sdf_shape_jolt.h"
 
+#include "physics/facing.h"
 #include "physics/sdf_collision.h"
 
 #include <Jolt/Physics/Collision/CastResult.h>
@@ -27,24 +28,9 @@ using namespace JPH;
 
 constexpr EShapeSubType kType = EShapeSubType::User1;
 constexpr float kWorldSize = 1e5f;  // of what has no end: the tree of boxes wants finite ones
-constexpr uint kNormalBits = 6;     // an axis: three degrees
-
-// Jolt keeps contacts between steps by the numbers of the parts that touch. A field's parts are the directions it faces: two contacts of
-// one pair with one number would be taken for each other. The direction as a point of an octahedron, unfolded
-// (Meyer, Süßmuth, Sußner, Stamminger and Greiner, "On Floating-Point Normal Vectors", 2010).
-uint32 number_of(vec3 n) {
-    const float size = std::abs(n.x) + std::abs(n.y) + std::abs(n.z);
-    float u = n.x / size, v = n.z / size;
-    if (n.y < 0) {
-        const float folded = (1 - std::abs(v)) * std::copysign(1.0f, u);
-        v = (1 - std::abs(u)) * std::copysign(1.0f, v);
-        u = folded;
-    }
-    static constexpr float kSteps = float((1 << kNormalBits) - 1);
-    const auto step = [](float w) { return uint32(std::clamp(std::round((w * 0.5f + 0.5f) * kSteps), 0.0f, kSteps)); };
-    return step(u) << kNormalBits | step(v);
-}
-
+// Jolt keeps contacts between steps, and sorts them, by the numbers of the parts that touch. A field's parts are the directions it faces.
+// Contacts of one pair that face alike within five degrees are one to Jolt (PhysicsSettings::mContactNormalCosMaxDeltaRotation), others
+// must not share a number: their order, and so the outcome, would be left to the threads.
 const JoltSdfShape& field_of(const JPH::Shape* s) { return *static_cast<const JoltSdfShape*>(s); }
 
 Pose pose_of(Mat44Arg m) { return {to_vec(m.GetTranslation()), to_quat(m.GetQuaternion())}; }
@@ -62,10 +48,10 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
         if (collector.ShouldEarlyOut()) return;
         if (-c.depth >= collector.GetEarlyOutFraction()) continue;
         const vec3 normal = rotate(world.rotation, c.normal), on1 = world * c.point;
-        const uint32 number = number_of(c.normal);
-        const SubShapeID part1 = field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID();
+        const uint32 number = facing(c.normal);
+        const SubShapeID part1 = field1 ? id1.PushID(number, kFacingBits).GetID() : id1.GetID();
         collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
-                                            part1, id2.PushID(number, 2 * kNormalBits).GetID(),
+                                            part1, id2.PushID(number, kFacingBits).GetID(),
                                             TransformedShape::sGetBodyID(collector.GetContext())));
     }
 }
@@ -106,7 +92,7 @@ void collide_mesh(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, V
         if (-c.depth >= collector.GetEarlyOutFraction()) continue;
         const vec3 normal = rotate(world2.rotation, c.normal), on1 = world2 * c.point;
         collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
-                                            id1.PushID(number_of(c.normal), 2 * kNormalBits).GetID(), SubShapeID(),
+                                            id1.PushID(facing(c.normal), kFacingBits).GetID(), SubShapeID(),
                                             TransformedShape::sGetBodyID(collector.GetContext())));
     }
 }
@@ -121,7 +107,7 @@ void cast_at_mesh(const ShapeCast& moving, const ShapeCastSettings&, const JPH::
     if (!hit || hit->fraction >= collector.GetEarlyOutFraction()) return;
     const Vec3 point = transform2 * to_jolt(hit->point);
     collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)), false,
-                                     id1.PushID(number_of(hit->normal), 2 * kNormalBits).GetID(), SubShapeID(),
+                                     id1.PushID(facing(hit->normal), kFacingBits).GetID(), SubShapeID(),
                                      TransformedShape::sGetBodyID(collector.GetContext())));
 }
 
@@ -141,10 +127,10 @@ void cast(const ShapeCast& moving, const ShapeCastSettings& settings, const JPH:
     const bool back_face = dot(hit->normal, way) > 0;
     if (back_face && settings.mBackFaceModeConvex == EBackFaceMode::IgnoreBackFaces) return;
     const Vec3 point = transform2 * to_jolt(hit->point - field.center());
-    const uint32 number = number_of(hit->normal);
+    const uint32 number = facing(hit->normal);
     collector.AddHit(ShapeCastResult(hit->fraction, point, point, transform2.Multiply3x3(to_jolt(-hit->normal)),
-                                     back_face, field1 ? id1.PushID(number, 2 * kNormalBits).GetID() : id1.GetID(),
-                                     id2.PushID(number, 2 * kNormalBits).GetID(),
+                                     back_face, field1 ? id1.PushID(number, kFacingBits).GetID() : id1.GetID(),
+                                     id2.PushID(number, kFacingBits).GetID(),
                                      TransformedShape::sGetBodyID(collector.GetContext())));
 }
 
@@ -177,7 +163,7 @@ AABox JoltSdfShape::GetLocalBounds() const {
     return {to_jolt(box.min - center()), to_jolt(box.max - center())};
 }
 
-uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return 2 * kNormalBits; }
+uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return kFacingBits; }
 
 const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
 
@@ -202,7 +188,7 @@ bool JoltSdfShape::CastRay(const RayCast& ray, const SubShapeIDCreator& id, RayC
         cast_ray(sdf_->field(), to_vec(ray.mOrigin) + center(), to_vec(ray.mDirection), std::min(hit.mFraction, 1.0f));
     if (!found || found->fraction >= hit.mFraction) return false;
     hit.mFraction = found->fraction;
-    hit.mSubShapeID2 = id.PushID(number_of(found->normal), 2 * kNormalBits).GetID();
+    hit.mSubShapeID2 = id.PushID(facing(found->normal), kFacingBits).GetID();
     return true;
 }
 
