@@ -298,6 +298,7 @@ brass = material("brass", (0.78, 0.57, 0.22, 1), 1.0, 0.32)
 rubber = material("rubber", (0.03, 0.03, 0.03, 1), 0.0, 0.85)
 mesh_holes = material("grille", (1, 1, 1, 1), 0.9, 0.45, baseColorTexture=texture(image("grille", 128, grille, 4)), alphaMode="MASK", alphaCutoff=0.5, doubleSided=True)
 dial = material("dial", (1, 1, 1, 1), 0.0, 0.3, baseColorTexture=texture(image("gauge", S, gauge)), emissiveFactor=[1, 0.9, 0.7], emissiveTexture={"index": len(TEXTURES) - 1}, extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 2.0}})
+cover = material("cover glass", (0.8, 0.95, 1, 0.14), 0.0, 0.04, alphaMode="BLEND")
 lamp = material("lamp", (0.05, 0.02, 0.02, 1), 0.0, 0.2, emissiveFactor=[1.0, 0.12, 0.04], extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 6.0}})
 
 CRANK, ROD, HEIGHT = 0.11, 0.34, 0.32  # metres: throw, length of a rod, the crank's axis over the bench
@@ -319,6 +320,7 @@ disc = []
 for i in range(48):
     a, b = 2 * math.pi * i / 48, 2 * math.pi * (i + 1) / 48
     disc += [((x, y, 0), (0, 0, 1), (0.5 + x / 0.132, 0.5 - y / 0.132)) for x, y in ((0, 0), (0.066 * math.cos(a), 0.066 * math.sin(a)), (0.066 * math.cos(b), 0.066 * math.sin(b)))]
+front = moved(disc, (0.3, 0.2, 0.307))
 disc = moved(disc, (0.3, 0.2, 0.296))
 stalk = moved(lathe([(0.018, 0), (0.018, 0.13)], 16), (0.3, 0.105, 0.28))
 beacon = moved(lathe([(0.035, 0), (0.035, 0.03), (0.03, 0.05), (0.018, 0.066), (0, 0.07)], 32), (-0.32, 0.11, 0.15))
@@ -328,7 +330,7 @@ for i in range(48):
     a, b = 2 * math.pi * i / 48, 2 * math.pi * (i + 1) / 48
     for y, z in ((0, 0), (0.166 * math.cos(a), 0.166 * math.sin(a)), (0.166 * math.cos(b), 0.166 * math.sin(b))):
         round_holes.append(((0, y, z), (1, 0, 0), (z * 8, -y * 8)))
-static = node("housing", mesh("housing", [(housing, painted), (bolts + stalk, steel), (gauge_case, brass), (disc, dial), (beacon, lamp), (shroud, painted), (moved(round_holes, (-0.335, 0.34, 0)), mesh_holes)]))
+static = node("housing", mesh("housing", [(housing, painted), (bolts + stalk, steel), (gauge_case, brass), (disc, dial), (front, cover), (beacon, lamp), (shroud, painted), (moved(round_holes, (-0.335, 0.34, 0)), mesh_holes)]))
 
 shaft = moved(lathe([(0, -0.36), (0.026, -0.36), (0.026, 0.36), (0, 0.36)], 24), (0, 0, 0), "x", math.pi / 2)
 for z in (-0.09, 0.09):

@@ -35,9 +35,13 @@ struct Material {
     float roughness = 0.7f;    ///< perceptual, [0, 1]; alpha = roughness²
     float metallic = 0.0f;     ///< [0, 1]
     vec3 emissive{0, 0, 0};    ///< radiance, cd/m²
-    float opacity = 1.0f;      ///< (0, 1]; below 1 the forward pass draws it
+    float opacity = 1.0f;      ///< (0, 1]: the share of light that does not go in; below 1 the forward pass draws it
     float friction = 0.5f;     ///< >= 0
     float restitution = 0.0f;  ///< [0, 1]
+    float ior = 1.5f;          ///< where opacity is below 1: how much light bends going in, [1, 4]
+    /// … and what is left of white light after attenuation_distance metres inside (Beer and Lambert); 0 metres: all of it
+    vec3 attenuation_color{1, 1, 1};
+    float attenuation_distance = 0;
     friend bool operator==(const Material&, const Material&) = default;
 };
 

@@ -78,6 +78,7 @@ struct Instance {
     std::shared_ptr<const field::BrickSet> bricks;  ///< shared by all that look alike
     Pose pose, before;                              ///< now, and in the frame before
     uint32_t material = 0;                          ///< number of what its parts without a material are made of
+    uint32_t glass = 0;  ///< number of the material that light goes through it by, with opacity below 1; 0: it is solid
 };
 
 /// A line around an edit, by its row in the field's program, or in that of the instance that it is part of.
@@ -97,6 +98,24 @@ struct EditMotion {
 struct MeshInstance {
     std::shared_ptr<const model::Drawable> model;  ///< immutable
     Transform transform, before;                   ///< world from model: now, and in the frame before (for motion)
+    std::optional<Outline> outline{};              ///< round what is seen of it, in shaded pictures
+};
+
+/// A straight line over the finished picture, for whoever looks for a fault.
+struct DebugLine {
+    dvec3 a, b;             ///< its ends, world metres
+    vec3 color{1, 1, 1};    ///< linear Rec. 709, as the screen shows it: neither exposed nor tone-mapped
+    float width_px = 1.5f;  ///< (0, 64]
+    float hidden = 0.15f;   ///< share of it that shows where something solid is nearer, [0, 1]
+};
+
+/// A soft round puff that faces the camera.
+struct Particle {
+    vec3 position, before;  ///< its middle, world metres: now, and in the frame before
+    float radius = 0.1f;    ///< metres, > 0
+    vec3 color{1, 1, 1};    ///< share of light that it scatters, linear Rec. 709
+    float opacity = 0.5f;   ///< of its middle, [0, 1]
+    vec3 emissive{};        ///< radiance of its middle
 };
 
 /// Everything a picture is made from. World::frame() fills one in.
@@ -109,13 +128,15 @@ struct Frame {
     std::shared_ptr<const render::shade::EnvironmentMap> environment_map;  ///< of environment->file
     Camera camera;
     int coarsened = 0;                  ///< times the voxel size was doubled to fit the pool
-    std::vector<Instance> instances;    ///< solid beside the field, as a hard union with it
+    std::vector<Instance> instances;    ///< beside the field; solid ones as a hard union with it
     std::vector<EditOutline> outlines;  ///< of shaded pictures
     std::vector<MeshInstance> meshes;
     double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
     std::vector<EditMotion> moved;     ///< for motion
     std::vector<Box3>
         changed;  ///< where the field has become another since the frame before: nothing of it was anywhere
+    std::vector<Particle> particles;
+    std::vector<DebugLine> lines;  ///< of shaded pictures; later ones over earlier ones
 };
 
 /// Ways to the same picture. Compute is there on every device; the others march the bricks of a world of one level by a ray-tracing
@@ -139,6 +160,9 @@ struct RenderSettings {
     float elapsed = 0;  ///< seconds since this renderer's picture before, for automatic exposure; 0: adapted at once
     Tier tier = Tier::Auto;
     bool soft_shadows = true;  ///< false: lights are points to shadows, whatever their size
+    int transparent_layers =
+        4;  ///< things of glass and panes that a ray may go through, [0, 16]; those behind are not seen
+    bool outline_hulls = false;  ///< meshes are outlined by their back faces made larger, for comparison
 };
 
 /// What a picture may cost. Low: hard shadows, surfaces as the bricks have them. Medium: hard shadows. High: everything that one picture can

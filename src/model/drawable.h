@@ -54,7 +54,8 @@ struct Surface {
     vec3 emissive{};  ///< with its strength
     float normal_scale = 1, occlusion_strength = 1;
     float alpha_cutoff = 0.5f;
-    bool mask = false;  ///< less alpha than the cutoff is a hole
+    bool mask = false;   ///< less alpha than the cutoff is a hole
+    bool blend = false;  ///< alpha is the share that it covers
     bool double_sided = false;
     TextureUse base_texture, rough_metal_texture, normal_texture, occlusion_texture, emissive_texture;
 };

@@ -188,7 +188,7 @@ private:
             if (!good) return damaged(what + " has a factor that is out of range or not a number");
             s.mask = m.alphaMode == "MASK";
             s.double_sided = m.doubleSided;
-            if (m.alphaMode == "BLEND") note(formatted("{} of {}: its alpha blends; drawn opaque", what, name_));
+            s.blend = m.alphaMode == "BLEND";
             const auto take = [&](const auto& info, const char* which, TextureUse& to) {
                 auto use = texture(info, what + "." + which);
                 if (use) to = *use;

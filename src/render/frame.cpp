@@ -3,6 +3,7 @@
 
 #include "base/format.h"
 #include "render/lib/pack.h"
+#include "render/passes/forward.h"
 #include "render/passes/instances.h"
 
 #include <cmath>
@@ -121,14 +122,19 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (wanted == View::Shaded) {
         Image radiance = light(g, in, surface.seen, surface);
-        if (in.taa) radiance = taa(g, in, radiance, surface.depth, motion(g, in, surface.seen));
+        Front front = draw_through(g, in, surface, radiance);
+        Image moved = in.taa ? motion(g, in, front.surface.seen) : radiance;  // not read without
+        draw_particles(g, in, surface.depth, front, radiance, moved);
+        if (in.taa) radiance = taa(g, in, radiance, front.surface.depth, moved);
         out.radiance = g.readback(radiance);
         if (in.develops) {
             Buffer exposure = in.exposure;
             if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
             Image shown = tonemap(g, radiance, glow, exposure, in.camera);
-            if (in.outline_count > 0) shown = outline(g, in, surface.seen, shown);
+            if (in.outline_hulls) shown = draw_hulls(g, in, surface, shown);
+            if (in.outline_count > 0 || in.outlines_meshes) shown = outline(g, in, surface.seen, shown);
+            shown = draw_lines(g, in, surface.depth, shown);
             out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
         }
@@ -167,7 +173,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     std::vector<const Kernel*> out;
-    if (!in.analytic && !in.rt) out.push_back(&march_kernel(in));
+    if (!in.analytic && (!in.rt || in.has_blends)) out.push_back(&march_kernel(in));
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
     out.push_back(&resolve_kernel(in));
@@ -181,6 +187,8 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&shadow_kernel(in));
     if (in.has_meshes) out.push_back(&mesh_shadow_kernel(in));
     out.push_back(&light_kernel(in));
+    through_kernels(in, out);
+    if (in.has_particles) out.insert(out.end(), {&kParticles, in.image_sky ? &kParticlesLightImage : &kParticlesLight});
     if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
     if (in.taa && in.moved.owners.count > 0) out.push_back(&specialised(kOutlineMask, in.moved.owners.use));
     if (!in.develops) return out;
@@ -189,15 +197,20 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
         out.insert(out.end(), {&kBloomDown, &kBloomUp});
     if (in.camera.bloom > 0 && in.camera.bloom_kind == BloomKind::Gaussian) out.push_back(&kBloomBlur);
     out.push_back(&kTonemap);
-    if (in.outline_count > 0)
-        out.insert(out.end(), {&specialised(kOutlineMask, in.use_of_outlines), &kOutlineFlood, &kOutlineDraw});
+    if (in.outline_count > 0) out.push_back(&specialised(kOutlineMask, in.use_of_outlines));
+    if (in.outline_count > 0 || in.outlines_meshes) out.insert(out.end(), {&kOutlineFlood, &kOutlineDraw});
+    if (in.outlines_meshes || in.outline_hulls) out.push_back(&kOutlineMeshes);
+    if (in.has_lines || in.outline_hulls) out.push_back(&kLinesOver);
     return out;
 }
 
 std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
-    if (!in.has_meshes) return {};
-    if (in.mesh_shader) return {&kMeshOneSidedGroups, &kMeshDoubleSidedGroups, &kMeshMaskedGroups};
-    return {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
+    std::vector<const RasterKernel*> out;
+    if (in.has_meshes && in.mesh_shader) out = {&kMeshOneSidedGroups, &kMeshDoubleSidedGroups, &kMeshMaskedGroups};
+    if (in.has_meshes && !in.mesh_shader) out = {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
+    if (in.has_lines) out.push_back(&kLines);
+    if (in.outline_hulls) out.push_back(&kOutlineHull);
+    return out;
 }
 
 std::vector<const TraceKernel*> frame_trace_kernels(const TileInputs& in) {

@@ -9,6 +9,7 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 
 namespace kiln::render {
 
@@ -23,6 +24,19 @@ uint32_t slots_of(const field::BrickSet& set) { return std::max(set.field().slot
 struct Rotation {
     double rows[3][3];  // object to world
 };
+
+// Beer and Lambert: what is left of light after a metre is exp(-absorbed). Black is as good as a millionth.
+GlassRecord glass_record(const Material& m) {
+    GlassRecord g{};
+    g.ior = m.ior;
+    g.opacity = m.opacity;
+    if (!(m.attenuation_distance > 0)) return g;
+    const auto absorbed = [&](float left) { return -std::log(std::clamp(left, 1e-6f, 1.0f)) / m.attenuation_distance; };
+    g.absorbed_red = absorbed(m.attenuation_color.x);
+    g.absorbed_green = absorbed(m.attenuation_color.y);
+    g.absorbed_blue = absorbed(m.attenuation_color.z);
+    return g;
+}
 
 Rotation rotation_of(quat q) {
     const double size = std::sqrt(double(q.x) * q.x + double(q.y) * q.y + double(q.z) * q.z + double(q.w) * q.w);
@@ -169,14 +183,16 @@ Result<void> GpuInstances::write_tables() {
     return buffer_of(set_table_, "instance sets", std::as_bytes(std::span(table)));
 }
 
-void GpuInstances::place(std::span<const Instance> instances, const FrameParams& frame) {
+void GpuInstances::place(std::span<const Instance> instances, const FrameParams& frame,
+                         std::span<const Material> materials) {
     const auto start = std::chrono::steady_clock::now();
     records_.resize(instances.size());
+    glass_.assign(instances.size(), {});
     const double h = double(frame.grid.voxel_size);
     const double eye[3] = {(double(frame.eye_x) + double(frame.eye_part_x)) * h,
                            (double(frame.eye_y) + double(frame.eye_part_y)) * h,
                            (double(frame.eye_z) + double(frame.eye_part_z)) * h};
-    std::vector<Box3> boxes(instances.size());
+    std::vector<Box3> boxes(instances.size()), glass_boxes(instances.size());
     for (size_t i = 0; i < instances.size(); ++i) {
         const Instance& instance = instances[i];
         const Rotation now = rotation_of(instance.pose.rotation), before = rotation_of(instance.before.rotation);
@@ -217,24 +233,36 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
             low[k] = float((center - reach - slack) / h);
             high[k] = float((center + reach + slack) / h);
         }
+        if (instance.glass != 0 && instance.glass < materials.size())
+            glass_[i] = glass_record(materials[instance.glass]);
         if (instance.bricks->field().stats().bricks > 0)
-            boxes[i] = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
+            (instance.glass == 0 ? boxes : glass_boxes)[i] = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
     }
     nodes_ = instance_tree(boxes);
+    glass_nodes_ = instance_tree(glass_boxes);
     place_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
 InstanceHandles GpuInstances::import(Graph& graph) const {
     InstanceHandles out;
-    if (nodes_.empty()) return out;
+    if (nodes_.empty() && glass_nodes_.empty()) return out;
     out.instances = graph.upload("instances", std::span<const InstanceRecord>(records_));
-    out.nodes = graph.upload("instance tree", std::span<const InstanceNode>(nodes_));
+    if (!nodes_.empty()) out.nodes = graph.upload("instance tree", std::span<const InstanceNode>(nodes_));
+    if (!glass_nodes_.empty()) {
+        std::vector<std::byte> tree(glass_nodes_.size() * sizeof(InstanceNode) + glass_.size() * sizeof(GlassRecord));
+        std::memcpy(tree.data(), glass_nodes_.data(), glass_nodes_.size() * sizeof(InstanceNode));
+        std::memcpy(tree.data() + glass_nodes_.size() * sizeof(InstanceNode), glass_.data(),
+                    glass_.size() * sizeof(GlassRecord));
+        out.glass_nodes = graph.upload("glass tree", std::span<const std::byte>(tree));
+        out.glass = graph.upload("glass", std::span<const GlassRecord>(glass_));
+    }
     out.sets = graph.import("instance sets", set_table_);
     out.cells = graph.import("instance cells", cells_);
     out.records = graph.import("instance bricks", brick_records_);
     out.code = graph.import("instance code", code_);
     out.numbers = graph.import("instance numbers", numbers_);
     out.node_count = uint32_t(nodes_.size());
+    out.glass_node_count = uint32_t(glass_nodes_.size());
     out.use = use_;
     return out;
 }

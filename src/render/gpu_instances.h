@@ -6,6 +6,7 @@
 #include "field/brick_set.h"
 #include "render/gpu_field.h"
 #include "render/passes/frame.gpu.h"
+#include "render/passes/glass.gpu.h"
 #include "render/passes/instances.gpu.h"
 #include "rhi/range_allocator.h"
 
@@ -24,7 +25,18 @@ struct InstanceHandles {
     Buffer records, code, numbers;
     uint32_t node_count = 0;
     TapeUse use;  // of the sets' code
+    Buffer glass_nodes,
+        glass;  // GlassRecord of every instance; the tree of those that light goes through, and those records again
+    uint32_t glass_node_count = 0;
     explicit operator bool() const { return node_count != 0; }
+    bool any() const { return node_count + glass_node_count != 0; }
+    // Those that light goes through, for the passes that find and draw instances.
+    InstanceHandles of_glass() const {
+        InstanceHandles out = *this;
+        out.nodes = glass_nodes;
+        out.node_count = glass_node_count;
+        return out;
+    }
 };
 
 class GpuInstances {
@@ -39,7 +51,7 @@ public:
     // Brings sets that are not here yet; after GpuField::update().
     Result<void> update(std::span<const Instance> instances);
     // Where they are, seen by this frame's eye.
-    void place(std::span<const Instance> instances, const FrameParams& frame);
+    void place(std::span<const Instance> instances, const FrameParams& frame, std::span<const Material> materials = {});
 
     InstanceHandles import(Graph& graph) const;
 
@@ -49,6 +61,8 @@ public:
     double place_ms() const { return place_ms_; }        // CPU time of the last place()
     const std::vector<InstanceRecord>& records() const { return records_; }
     const std::vector<InstanceNode>& nodes() const { return nodes_; }
+    // Of those that light goes through, finest voxels from the eye.
+    const std::vector<InstanceNode>& glass_nodes() const { return glass_nodes_; }
     // By InstanceRecord::set.
     const std::vector<std::shared_ptr<const field::BrickSet>>& sets() const { return order_; }
 
@@ -73,7 +87,8 @@ private:
     bool tables_stale_ = true;
     rhi::BufferHandle cells_, code_, numbers_, brick_records_, set_table_;
     std::vector<InstanceRecord> records_;
-    std::vector<InstanceNode> nodes_;
+    std::vector<InstanceNode> nodes_, glass_nodes_;
+    std::vector<GlassRecord> glass_;
     TapeUse use_;
     uint32_t bricks_ = 0, bricks_new_ = 0;
     double place_ms_ = 0;

@@ -229,6 +229,8 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
 Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& camera) {
     parts_.clear();
     clusters_.clear();
+    blends_.clear();
+    outlined_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
     triangles_ = triangles_drawn_ = 0;
     holes_ = false;
@@ -270,24 +272,39 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
             !ok)
             return ok;
     }
+    std::vector<uint32_t> outline_of(frame.meshes.size(), 0);  // by number of the mesh
+    for (size_t i = 0; i < frame.meshes.size(); ++i) {
+        if (!frame.meshes[i].outline) continue;
+        outlined_.push_back({.outline = *frame.meshes[i].outline, .middle = {}});
+        outline_of[i] = uint32_t(outlined_.size());
+    }
+    std::vector<Box3> boxes(outlined_.size());
     for (const MeshSet::Part& part : set.parts) {
         const Primitive& p = set.primitive(part);
+        if (const uint32_t n = outline_of[part.mesh]; n > 0) boxes[n - 1] = box_union(boxes[n - 1], part.bounds);
         const Model& at = places_[part.model];
         Matrix place = part.place, before = part.before;
         for (Matrix* m : {&place, &before}) (*m)[12] -= eye.x, (*m)[13] -= eye.y, (*m)[14] -= eye.z;
         const Matrix back = model::inverse(place);
         const model::Surface& surface = set.drawable(part).surfaces[p.surface];
-        const bool moved = part.first_moved != UINT32_MAX;
+        const bool moved = part.first_moved != UINT32_MAX, holes = surface.mask || surface.blend;
         parts_.push_back({row(place, 0), row(place, 1), row(place, 2), row(before, 0), row(before, 1), row(before, 2),
                           row(back, 0), row(back, 1), row(back, 2), at.first_surface + p.surface,
                           (at.first_corner + p.first_index) / 3,
                           moved ? first_moved_vertex_ + part.first_moved - p.first_vertex : at.first_vertex,
                           moved ? first_moved_node_ + part.first_node : at.first_node + p.first_node, p.node_count,
-                          (surface.double_sided ? kMeshDoubleSided : 0u) | (surface.mask ? kMeshMask : 0u) |
-                              (p.closed && !moved && !surface.mask ? kMeshClosed : 0u) |
+                          // What blends shadows where it covers more than its cutoff, as if it had holes.
+                          (surface.double_sided ? kMeshDoubleSided : 0u) | (holes ? kMeshMask : 0u) |
+                              (surface.blend ? kMeshBlend : 0u) | (p.closed && !moved && !holes ? kMeshClosed : 0u) |
                               (model::determinant(place) < 0 ? kMeshMirrored : 0u),
-                          p.index_count / 3, 0});
-        holes_ = holes_ || surface.mask;
+                          p.index_count / 3, outline_of[part.mesh]});
+        holes_ = holes_ || holes;
+        if (surface.blend) {
+            const auto from_eye = [&](vec3 v) {
+                return vec3{float(double(v.x) - eye.x), float(double(v.y) - eye.y), float(double(v.z) - eye.z)};
+            };
+            blends_.push_back({from_eye(part.bounds.min), from_eye(part.bounds.max)});
+        }
         triangles_ += p.index_count / 3;
     }
     std::vector<bool> in_sight;
@@ -296,7 +313,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         if (in_sight[i]) triangles_drawn_ += parts_[i].triangle_count;
     const auto list = [&](uint32_t& count, bool holes, bool both) {
         for (uint32_t i = 0; i < parts_.size(); ++i) {
-            if (!in_sight[i]) continue;
+            if (!in_sight[i] || (parts_[i].flags & kMeshBlend) != 0) continue;  // what blends: mesh_trace.comp
             const bool masked = (parts_[i].flags & kMeshMask) != 0, two = (parts_[i].flags & kMeshDoubleSided) != 0;
             if (masked != holes || (!holes && two != both)) continue;
             for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++count) clusters_.push_back({i, t});
@@ -305,6 +322,18 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     list(one_sided_, false, false);
     list(double_sided_, false, true);
     list(masked_, true, true);
+    for (uint32_t n = 0; n < outlined_.size(); ++n) {
+        MeshOutline& o = outlined_[n];
+        if (boxes[n].empty()) continue;
+        const vec3 middle = boxes[n].center();
+        o.middle = {float(double(middle.x) - eye.x), float(double(middle.y) - eye.y), float(double(middle.z) - eye.z)};
+        o.first_cluster = uint32_t(clusters_.size());
+        for (uint32_t i = 0; i < parts_.size(); ++i) {
+            if (!in_sight[i] || parts_[i].outline != n + 1) continue;
+            for (uint32_t t = 0; t < parts_[i].triangle_count; t += kMeshCluster, ++o.clusters)
+                clusters_.push_back({i, t});
+        }
+    }
     return {};
 }
 
@@ -324,6 +353,7 @@ MeshHandles GpuMeshes::import(Graph& g) const {
     out.one_sided = one_sided_;
     out.double_sided = double_sided_;
     out.masked = masked_;
+    out.outlined = outlined_;
     return out;
 }
 

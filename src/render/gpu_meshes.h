@@ -13,6 +13,13 @@
 
 namespace kiln::render {
 
+// An outlined mesh.
+struct MeshOutline {
+    Outline outline;
+    vec3 middle;  // of its box, metres from the eye
+    uint32_t first_cluster = 0, clusters = 0;
+};
+
 // A frame's meshes as resources of a graph.
 struct MeshHandles {
     Buffer clusters;  // MeshClusterRef: one-sided parts first, then double-sided ones, then those with holes
@@ -21,6 +28,7 @@ struct MeshHandles {
     Buffer nodes;  // MeshNode: the parts' tree, then each part's
     std::array<Image, 2 * kMeshPages> pages;
     uint32_t one_sided = 0, double_sided = 0, masked = 0;  // clusters
+    std::vector<MeshOutline> outlined;                     // their clusters follow those
 };
 
 class GpuMeshes {
@@ -36,6 +44,9 @@ public:
     MeshHandles import(Graph& g) const;
     bool empty() const { return parts_.empty(); }
     bool holes() const { return holes_; }  // in some part, in sight or not
+    // Of parts that blend, metres from the eye.
+    const std::vector<Box3>& blends() const { return blends_; }
+    const std::vector<MeshOutline>& outlined() const { return outlined_; }
     uint64_t triangles() const { return triangles_; }
     uint64_t triangles_drawn() const { return triangles_drawn_; }
 
@@ -59,6 +70,8 @@ private:
     std::vector<MeshClusterRef> clusters_;
     uint32_t one_sided_ = 0, double_sided_ = 0, masked_ = 0;
     bool holes_ = false;
+    std::vector<Box3> blends_;
+    std::vector<MeshOutline> outlined_;
     uint64_t triangles_ = 0, triangles_drawn_ = 0;
 };
 

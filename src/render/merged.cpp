@@ -6,15 +6,19 @@
 #include "field/field.h"
 #include "sdf/place.h"
 
+#include <algorithm>
+
 namespace kiln::render {
 
 Result<sdf::Program> merged_program(const Frame& frame) {
     const sdf::Program& beside = frame.levels ? *frame.levels->program() : frame.field->program();
-    if (frame.instances.empty()) return beside;
+    const auto solid = [](const Instance& i) { return i.glass == 0; };
+    if (std::none_of(frame.instances.begin(), frame.instances.end(), solid)) return beside;
     sdf::Program out = sdf::detached(beside);
     uint64_t order = 0;
     for (const uint32_t row : out.rows()) order = std::max(order, out.edits[row].order);
     for (const Instance& i : frame.instances) {
+        if (!solid(i)) continue;
         order = sdf::order_between(order, UINT64_MAX);
         auto placed = sdf::place(out, i.bricks->program(), i.pose, i.material, order);
         if (!placed) return placed.error();

@@ -6,7 +6,9 @@
 #include "render/lib/color.gpu.h"
 #include "render/lib/pack.h"
 #include "render/lib/shading.gpu.h"
+#include "render/lib/glass.gpu.h"
 #include "render/mesh_trace.h"
+#include "render/reference_glass.h"
 
 #include <algorithm>
 #include <cmath>
@@ -70,6 +72,7 @@ struct Scene {
     SkyParams sky;         // with the sun's disc: for rays from the eye
     SkyParams sky_no_sun;  // for all others: the sun is a light of its own
     const ReferenceSettings& settings;
+    const GlassTrace& glass;
 
     dvec3 normal(dvec3 p) const {
         if (field.normal) return field.normal(p);
@@ -108,7 +111,8 @@ struct Hit {
     dvec3 p;  // just off the surface: where the next rays start
     vec3 n;   // as the shaders get it
     Material material;
-    float ambient = 1;  // share of the sky's light that a texture leaves, where nothing else occludes it
+    float ambient = 1;   // share of the sky's light that a texture leaves, where nothing else occludes it
+    bool matte = false;  // it reflects no more: that was done before
 };
 
 // The nearer of the field and the meshes; t < 0: neither.
@@ -142,7 +146,7 @@ Hit first_hit(const Scene& scene, dvec3 origin, dvec3 direction, double t_last) 
 SurfaceView view_of(const Scene& scene, const Hit& hit, dvec3 direction) {
     shade::SurfaceOptics optics =
         shade::surface_optics(hit.material.base_color, hit.material.metallic, hit.material.roughness);
-    if (scene.settings.lambert) {
+    if (scene.settings.lambert || hit.matte) {
         optics.metallic = 0;
         optics.dielectric_f0 = 0;
         optics.f90 = 0;
@@ -233,11 +237,55 @@ Bounce bounce(const SurfaceView& s, Random& random) {
     return {world, shade::brdf_times_cosine(s, world) * (1 / density)};
 }
 
+// Along a ray, and where glass takes it, to something solid; t < 0: none. Chance picks one way at every surface of glass.
+Hit follow(const Scene& scene, dvec3& origin, dvec3& direction, Random& random, vec3& carried, bool& bent) {
+    constexpr int kMostSurfaces = 64;
+    int inside = -1;
+    for (int i = 0; i < kMostSurfaces; ++i) {
+        const Hit hit = first_hit(scene, origin, direction, scene.settings.farthest);
+        if (scene.glass.empty()) return hit;
+        const double t_solid = hit.t < 0 ? scene.settings.farthest : hit.t;
+        const GlassTrace::Hit glass = scene.glass.first(origin, direction, t_solid, inside);
+        if (inside >= 0) carried = carried * scene.glass.left_after(inside, glass.t < 0 ? t_solid : glass.t);
+        if (glass.t < 0) return hit;
+        bent = true;
+        const Material& m = scene.glass.material(glass.which);
+        const dvec3 p = along(origin, direction, glass.t);
+        const double off = 1e-6 * std::max(0.1, glass.t) + 1e-7;
+        const bool in = inside < 0;
+        vec3 n = narrow(glass.normal) * (in ? 1.0f : -1.0f);  // against the ray
+        const vec3 d = narrow(direction);
+        const float cosine = std::clamp(-dot(n, d), 0.0f, 1.0f), ratio = in ? 1 / m.ior : m.ior;
+        if (random.next() < shade::dielectric_reflectance(cosine, ratio)) {
+            direction = wide(normalize(d + n * (2 * cosine)));
+            origin = along(p, wide(n), off);
+            continue;
+        }
+        if (in && random.next() < m.opacity) {
+            Hit outside;
+            outside.t = glass.t;
+            outside.p = along(p, wide(n), 1e-4 * std::max(0.1, glass.t));
+            outside.n = n;
+            outside.material = m;
+            outside.matte = true;
+            return outside;
+        }
+        direction = wide(shade::refracted(d, n, ratio));
+        origin = along(p, wide(n), -off);
+        inside = in ? glass.which : -1;
+    }
+    carried = {};
+    Hit none;
+    none.t = -1;
+    return none;
+}
+
 vec3 path(const Scene& scene, dvec3 origin, dvec3 direction, Random& random, bool& seen) {
     vec3 sum{}, carried{1, 1, 1};
     for (int depth = 0;; ++depth) {
-        const Hit hit = first_hit(scene, origin, direction, scene.settings.farthest);
-        if (depth == 0) seen = hit.t >= 0;
+        bool bent = false;
+        const Hit hit = follow(scene, origin, direction, random, carried, bent);
+        if (depth == 0) seen = hit.t >= 0 || bent;
         if (hit.t < 0) return sum + carried * scene.radiance(direction, depth == 0);
         sum = sum + carried * hit.material.emissive;
         const SurfaceView s = view_of(scene, hit, direction);
@@ -249,7 +297,8 @@ vec3 path(const Scene& scene, dvec3 origin, dvec3 direction, Random& random, boo
             LightSample there = light;
             there.l = narrow(l);
             if (dot(hit.n, there.l) > 0 && scene.reaches(hit.p, l, disc_distance(light, scene)))
-                sum = sum + carried * shade::shade_light(s, there, 1);
+                sum = sum + carried * scene.glass.straight(hit.p, l, disc_distance(light, scene)) *
+                                shade::shade_light(s, there, 1);
         }
         if (depth == scene.settings.most_bounces) return sum;
         const Bounce next = bounce(s, random);
@@ -294,7 +343,8 @@ double reference_hit(const ReferenceField& field, dvec3 origin, dvec3 direction,
 ReferencePicture render_reference(const ReferenceField& field, std::span<const Light> lights,
                                   const shade::SkyParams& sky, const Camera& camera,
                                   const ReferenceSettings& settings) {
-    Scene scene{field, {}, sky, sky, settings};
+    const GlassTrace glass(field.glass);
+    Scene scene{field, {}, sky, sky, settings, glass};
     scene.sky_no_sun.sun.w = 2;
     for (const Light& light : lights) scene.lights.push_back(shade::light_record(light));
     const shade::CameraParams eye = shade::camera_params(camera, settings.width, settings.height);

@@ -23,6 +23,13 @@ namespace kiln::render {
 
 class MeshTrace;
 
+// Something that light goes through, see Material::opacity.
+struct ReferenceGlass {
+    std::function<double(dvec3)> distance;
+    Box3 bounds;
+    Material material;
+};
+
 // All functions are called from many threads at once.
 struct ReferenceField {
     std::function<double(dvec3)> distance;    // metres, negative inside, 1-Lipschitz
@@ -30,6 +37,7 @@ struct ReferenceField {
     std::function<Material(dvec3)> material;  // at a surface point
     Box3 bounds;                              // holds all that is solid; faces may be infinite
     const MeshTrace* meshes = nullptr;        // triangles beside it
+    std::vector<ReferenceGlass> glass{};      // likewise; with paths alone
 };
 
 struct ReferenceSettings {

@@ -16,8 +16,11 @@
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
+#include "render/passes/forward.h"
+#include "render/particle_bins.h"
 #include "render/passes/instances.h"
 #include "render/picture.h"
+#include "render/through_rects.h"
 #include "render/temporal.h"
 #include "rhi/create.h"
 
@@ -33,6 +36,9 @@ namespace {
 constexpr int kTileWidth = 4096;
 constexpr int kTilePixels = 1 << 21;
 constexpr int kTilePixelsOfGpu = 9 << 20;
+// Pixels whose rays may be bent at once: a buffer of them is within a binding.
+constexpr int kBentRays = 1 << 21;
+static_assert(uint64_t{kBentRays} * sizeof(FrameRay) <= rhi::kMaxStorageBinding);
 
 }  // namespace
 }  // namespace render
@@ -60,8 +66,9 @@ struct Renderer::Impl {
     };
     std::optional<Before> before;
     uint64_t taa_frame = 0;
-    OutlineCode outlined;  // of the frame
-    MovedEdits moved;      // likewise, with taa
+    OutlineCode outlined;           // of the frame
+    MovedEdits moved;               // likewise, with taa
+    std::vector<LineRecord> lines;  // likewise
 
     ~Impl() {
         instances.reset();
@@ -80,7 +87,7 @@ struct Renderer::Impl {
     // Brings a frame's environment image to the device.
     Result<void> bring(const Frame& frame);
     Result<Picture> render(const Frame& frame, const RenderSettings& settings);
-    // The exact path has instances in its program.
+    // The exact path has solid instances in its program.
     Result<Picture> render_merged(const Frame& frame, const RenderSettings& settings);
     Result<void> render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                              Picture& picture);
@@ -130,6 +137,18 @@ struct Renderer::Impl {
         in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
         in.moved.has_boxes = !moved.boxes.empty();
         in.mesh_holes = meshes->holes();
+        in.transparent_layers = settings.view == View::Shaded ? std::clamp(settings.transparent_layers, 0, 16) : 0;
+        in.has_glass = in.transparent_layers > 0 &&
+                       std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) {
+                           return i.glass != 0 && i.bricks->field().stats().bricks > 0;
+                       });
+        in.has_particles = settings.view == View::Shaded && !frame.particles.empty();
+        in.has_blends = in.transparent_layers > 0 && !meshes->blends().empty();
+        const bool outlines = settings.view == View::Shaded && !meshes->outlined().empty() &&
+                              tiles_of(settings, frame.lights.size()) == 1;
+        in.outlines_meshes = outlines && !settings.outline_hulls;
+        in.outline_hulls = outlines && settings.outline_hulls;
+        in.has_lines = !lines.empty() && settings.view == View::Shaded && in.develops;
         return in;
     }
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
@@ -138,6 +157,8 @@ struct Renderer::Impl {
     }
     // Has the device what this tier needs?
     Result<void> check_tier(Tier tier) const;
+    // The parts of a tile behind which something lets light through.
+    void find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const;
     void add_times(const FrameTimes& times);
     // What the device complained about, as this call's error.
     Result<void> healthy() {
@@ -200,6 +221,38 @@ void Renderer::Impl::add_times(const FrameTimes& times) {
     }
 }
 
+void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const {
+    if (!in.has_glass && !in.has_blends) return;
+    std::vector<Box3> seen = meshes->blends();
+    const float h = params.grid.voxel_size;
+    for (const InstanceNode& n : instances->glass_nodes())
+        if (n.instance != kNoInstance)
+            seen.push_back({vec3{n.low_x, n.low_y, n.low_z} * h, vec3{n.high_x, n.high_y, n.high_z} * h});
+    const PixelRect tile{params.tile_x, params.tile_y, params.tile_width, params.tile_height};
+    for (const PixelRect& rect : through_rects(seen, params.camera, tile, kBentRays)) {
+        FrameParams part = params;
+        part.tile_x = rect.x, part.tile_y = rect.y;
+        part.tile_width = rect.width, part.tile_height = rect.height;
+        if (!in.refine) part.flags &= ~kFrameRefine;
+        ThroughPart& out = in.through.emplace_back();
+        out.x = rect.x - tile.x, out.y = rect.y - tile.y;
+        out.size = {uint32_t(rect.width), uint32_t(rect.height)};
+        out.frame = g.block(part);
+        part.flags |= kFrameRays;
+        out.frame_of_rays = g.block(part);
+        LightRects rects = (part.flags & kFrameAllLights) == 0
+                               ? light_rects(frame.lights, params.camera, rect.x, rect.y, rect.width, rect.height)
+                               : all_light_rects(frame.lights.size(), rect.width, rect.height);
+        out.lights_of_tile = rects.most;
+        if (rects.rects.empty()) rects.rects.emplace_back();
+        out.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
+    }
+    if (in.through.empty()) return;
+    LightRects all = all_light_rects(frame.lights.size(), params.tile_width, params.tile_height);
+    if (all.rects.empty()) all.rects.emplace_back();
+    in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
+}
+
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                                          Picture& picture) {
     const auto inputs_on = [&](Graph& g) {
@@ -232,11 +285,29 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
         in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
         in.exposure = g.import("exposure", exposure);
+        if (in.outline_count > 0 || in.outlines_meshes) {
+            std::vector<OutlineRecord> records = outlined.records;
+            for (const MeshOutline& o : meshes->outlined()) {
+                records.push_back({.red = o.outline.color.x,
+                                   .green = o.outline.color.y,
+                                   .blue = o.outline.color.z,
+                                   .width_px = o.outline.width_px,
+                                   .code_first = 0,
+                                   .code_count = 0,
+                                   .blend = 0,
+                                   .paints = 0,
+                                   .instance = kNoInstance,
+                                   .pad_0 = 0,
+                                   .pad_1 = 0,
+                                   .pad_2 = 0});
+                in.widest_outline = std::max(in.widest_outline, o.outline.width_px);
+            }
+            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(records));
+        }
         if (in.outline_count > 0) {
-            in.outlines = g.upload("outlines", std::span<const OutlineRecord>(outlined.records));
             in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(outlined.code));
         }
-        if (in.taa) {
+        if (in.taa || in.has_particles) {
             MotionParams motion = motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
                                                 params.width, params.height);
             motion.moved_count = in.moved.owners.count;
@@ -253,6 +324,33 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         }
         in.meshes = meshes->import(g);
         if (in.rt) in.boxes = boxes->import(g);
+        find_through(g, frame, params, in);
+        if (in.has_particles) {
+            const ParticleBins bins = particle_bins(frame.particles, params.camera, params.tile_x, params.tile_y,
+                                                    params.tile_width, params.tile_height);
+            in.particles.count = uint32_t(bins.records.size());
+            in.particles.first_level = bins.first_level;
+            in.particles.across = bins.across;
+            if (!bins.records.empty()) {
+                in.particles.records = g.upload("particles", std::span<const ParticleRecord>(bins.records));
+                in.particles.ends = g.upload("particle bins", std::span<const uint32_t>(bins.ends));
+                in.particles.numbers = g.upload("particle numbers", std::span<const uint32_t>(bins.numbers));
+            }
+        }
+        if (in.has_lines) {
+            in.lines.count = uint32_t(lines.size());
+            in.lines.lines = g.upload("debug lines", std::span<const LineRecord>(lines));
+            in.lines.params =
+                g.block(LineParams{.camera = shade::camera_params(frame.camera, params.width, params.height),
+                                   .width = params.width,
+                                   .height = params.height,
+                                   .tile_x = params.tile_x,
+                                   .tile_y = params.tile_y,
+                                   .tile_width = params.tile_width,
+                                   .tile_height = params.tile_height,
+                                   .pad_0 = 0,
+                                   .pad_1 = 0});
+        }
         return in;
     };
     const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
@@ -334,14 +432,16 @@ Result<Picture> Renderer::Impl::render_merged(const Frame& frame, const RenderSe
     if (!field_of_all) return Error{"analytic: " + field_of_all.error().message, field_of_all.error().kind};
     Frame merged = frame;
     merged.field = std::move(*field_of_all);
-    merged.instances.clear();
+    std::erase_if(merged.instances, [](const Instance& i) { return i.glass == 0; });
     // An object is one edit of the merged program: there is no code of its parts alone.
-    const size_t lines = std::erase_if(merged.outlines, [](const EditOutline& o) { return o.instance != UINT32_MAX; });
-    if (lines > 0) log::warn("analytic: outlines of {} edits of things that move are not drawn", lines);
+    const size_t dropped =
+        std::erase_if(merged.outlines, [](const EditOutline& o) { return o.instance != UINT32_MAX; });
+    if (dropped > 0) log::warn("analytic: outlines of {} edits of things that move are not drawn", dropped);
     auto picture = render(merged, settings);
     stats.instances = int(frame.instances.size());
     // Each is one edit of the merged program, whatever it is made of.
-    for (const Instance& i : frame.instances) stats.edits += int(i.bricks->program().index.size()) - 1;
+    for (const Instance& i : frame.instances)
+        if (i.glass == 0) stats.edits += int(i.bricks->program().index.size()) - 1;
     return picture;
 }
 
@@ -357,7 +457,9 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         return Error{
             "analytic: a world of several levels is drawn from bricks; set field.levels to 1 to march its edits",
             ErrorKind::Usage};
-    if (settings.analytic && !frame.instances.empty()) return render_merged(frame, settings);
+    const auto solid = [](const Instance& i) { return i.glass == 0; };
+    if (settings.analytic && std::any_of(frame.instances.begin(), frame.instances.end(), solid))
+        return render_merged(frame, settings);
     if (settings.analytic) {
         const std::span<const sdf::Instruction> code = program.tape();
         if (std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); }))
@@ -389,11 +491,18 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     }
     auto params = frame_params(frame, settings, *field);
     if (!params) return params.error();
+    lines = line_records(frame.lines, frame.camera.position);
+    constexpr size_t kMostParticles = rhi::kMaxStorageBinding / sizeof(ParticleRecord);
+    if (frame.particles.size() > kMostParticles)
+        return Error{formatted("{} particles; a frame has at most {}", frame.particles.size(), kMostParticles),
+                     ErrorKind::Usage};
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
-    instances->place(frame.instances, *params);
+    instances->place(frame.instances, *params, frame.materials);
     moved = {};
     if (settings.taa && settings.view == View::Shaded) moved = moved_edits(frame, program, *params);
     const TileInputs switches = inputs(frame, settings);
+    if (!lines.empty() && settings.view == View::Shaded && !switches.has_lines)
+        log::warn("debug lines are not drawn: the picture is several tiles");
     if (auto warm = runner->pipelines().warm_up(frame_kernels(switches, settings.view), frame_raster_kernels(switches),
                                                 frame_trace_kernels(switches));
         !warm)

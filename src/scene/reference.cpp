@@ -10,10 +10,14 @@
 #include "render/merged.h"
 #include "render/mesh_trace.h"
 #include "render/reference.h"
+#include "scene/movers.h"
 
 #include <kiln/renderer.h>
 
 #include <chrono>
+#include <limits>
+#include <memory>
+#include <vector>
 
 namespace kiln {
 namespace {
@@ -30,6 +34,18 @@ Material blend(const std::vector<Material>& materials, const sdf::MaterialMix& m
     out.roughness = mixed(out.roughness, other.roughness);
     out.metallic = mixed(out.metallic, other.metallic);
     return out;
+}
+
+// Where the object has a point of the world.
+dvec3 into_object(const Pose& pose, dvec3 p) {
+    const dvec3 u{-double(pose.rotation.x), -double(pose.rotation.y), -double(pose.rotation.z)};
+    const double w = double(pose.rotation.w);
+    const dvec3 v{p.x - double(pose.position.x), p.y - double(pose.position.y), p.z - double(pose.position.z)};
+    const auto crossed = [](dvec3 a, dvec3 b) {
+        return dvec3{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    };
+    const dvec3 t = crossed(u, v), s = crossed(u, t);
+    return {v.x + 2 * (w * t.x + s.x), v.y + 2 * (w * t.y + s.y), v.z + 2 * (w * t.z + s.z)};
 }
 
 }  // namespace
@@ -59,6 +75,17 @@ Result<Picture> render_reference(const Frame& frame, const RenderSettings& setti
     } else if (!field.bounds.empty()) {
         field.bounds =
             field.bounds.inflated(program.index.largest_reach());  // smooth unions bulge beyond their operands
+    }
+    std::vector<std::unique_ptr<scene::ExactField>> objects;
+    for (const Instance& i : frame.instances) {
+        if (i.glass == 0 || i.glass >= frame.materials.size()) continue;
+        const sdf::Program& object = i.bricks->program();
+        if (object.index.size() == 0) continue;
+        objects.push_back(std::make_unique<scene::ExactField>(object));
+        field.glass.push_back({.distance = [exact = objects.back().get(),
+                                            pose = i.pose](dvec3 p) { return exact->distance(into_object(pose, p)); },
+                               .bounds = scene::posed_box(object, i.pose).inflated(1e-4f),
+                               .material = frame.materials[i.glass]});
     }
     const render::MeshSet meshes = render::make_mesh_set(frame);
     const render::MeshTrace trace(meshes);

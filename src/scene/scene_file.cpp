@@ -207,6 +207,8 @@ private:
         if (const auto v = doc_.find(at, "rotation"); v && !in_.rotation(*v, &t.rotation)) return false;
         if (const auto v = doc_.find(at, "scale"); v && !in_.scale(*v, &t.scale)) return false;
         if (const auto v = doc_.find(at, "hidden")) out.hidden = doc_.is(*v, JsonType::True);
+        if (const auto v = doc_.find(at, "outline"))
+            return in_.table(*v, kOutlineTable, &out.outline.emplace().color.x);
         return true;
     }
 

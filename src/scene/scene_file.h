@@ -62,6 +62,7 @@ struct SceneMesh {
     Transform transform;
     bool hidden = false;
     JsonIndex place = 0;
+    std::optional<Outline> outline{};
 };
 
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its

@@ -15,7 +15,8 @@ std::shared_ptr<const model::Drawable> painted(const model::Drawable& drawable, 
         const bool two = s.double_sided;
         s = {};
         s.double_sided = two;
-        s.base_color = {m.base_color.x, m.base_color.y, m.base_color.z, 1};
+        s.base_color = {m.base_color.x, m.base_color.y, m.base_color.z, m.opacity};
+        s.blend = m.opacity < 1;
         s.metallic = m.metallic;
         s.roughness = m.roughness;
         s.emissive = m.emissive;
@@ -65,7 +66,7 @@ std::vector<MeshInstance> SceneMeshes::instances(const SceneData& scene) const {
     std::vector<MeshInstance> out;
     for (size_t i = 0; i < models.size(); ++i)
         if (models[i] && !scene.meshes[i].hidden)
-            out.push_back({models[i], scene.meshes[i].transform, scene.meshes[i].transform});
+            out.push_back({models[i], scene.meshes[i].transform, scene.meshes[i].transform, scene.meshes[i].outline});
     return out;
 }
 

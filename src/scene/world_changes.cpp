@@ -101,6 +101,15 @@ Result<void> World::Impl::exchange_material(Change& change) {
         change.held = {};
     } else {
         std::swap(data.materials[number].second, held->second);
+        // What light now goes through, or no longer does, stands apart, or no longer does.
+        const bool through = data.materials[number].second.opacity < 1;
+        if (!compile_later && through != (held->second.opacity < 1)) {
+            find_movers();
+            const std::lock_guard lock(mutex);
+            program.reset();
+            all.reset();
+            asked.reset();
+        }
     }
     return {};
 }

@@ -144,6 +144,9 @@ struct World::Impl {
     void add_mover(scene::Mover mover);
     void drop_mover(uint32_t key);
     std::optional<scene::Mover> mover_at(uint32_t slot) const;
+    // Number of the material that light goes through an edit by, if it does through all of it; else 0.
+    uint32_t glass_of(const Edit& edit) const;
+    bool stands_alone(const Edit& edit) const { return edit.dynamic || glass_of(edit) != 0; }
     /// After an edit's row was exchanged.
     void mover_changed(uint32_t slot, uint32_t removed, uint32_t inserted);
     /// After the whole list was compiled.

@@ -51,6 +51,37 @@ Box3 posed_box(const sdf::Program& object, const Pose& pose) {
 
 }  // namespace scene
 
+namespace {
+
+uint32_t glass_in(const scene::SceneData& data, const Node& node, const Object* of, MaterialId parents) {
+    const MaterialId own = node.material ? node.material : parents;
+    switch (node.kind) {
+    case Node::Kind::Shape:
+        return own && own.index < data.materials.size() && data.materials[own.index].second.opacity < 1
+                   ? sdf::material_number(own)
+                   : 0;
+    case Node::Kind::Object: {
+        const Object& object = data.objects[node.object.index];
+        return glass_in(data, object.nodes.front(), &object, own);
+    }
+    case Node::Kind::Fold:
+        break;
+    }
+    uint32_t first = 0;
+    for (const uint32_t child : node.children) {
+        const uint32_t number = glass_in(data, of->nodes[child], of, own);
+        if (number == 0) return 0;
+        if (first == 0) first = number;
+    }
+    return first;
+}
+
+}  // namespace
+
+uint32_t World::Impl::glass_of(const Edit& edit) const {
+    return edit.op == Op::Union ? glass_in(data, edit.node, nullptr, {}) : 0;
+}
+
 // Its edits as a program of their own. Samples are the list's, so that it can be placed into it.
 Result<void> World::Impl::compile_mover(Mover& m) {
     sdf::Program object;
@@ -63,6 +94,9 @@ Result<void> World::Impl::compile_mover(Mover& m) {
         own.push_back(*edits[slot].edit);
         owners.push_back(slot);
     }
+    m.glass = glass_of(own.front());
+    for (const Edit& e : own)
+        if (glass_of(e) == 0) m.glass = 0;
     own = scene::in_frame_of_first(std::move(own));
     m.material = 0;
     if (m.body == Mover::kNoBody) {
@@ -158,14 +192,15 @@ std::optional<Mover> World::Impl::mover_at(uint32_t slot) const {
                 m.slots.push_back(other);
         return m;
     }
-    if (!edit.dynamic) return std::nullopt;
+    if (!stands_alone(edit)) return std::nullopt;
     Mover m;
     m.slots = {slot};
     return m;
 }
 
 void World::Impl::mover_changed(uint32_t slot, uint32_t removed, uint32_t inserted) {
-    if (movers.empty() && (inserted == field::kNoRow || (data.bodies.empty() && !edits[slot].edit->dynamic))) return;
+    if (movers.empty() && (inserted == field::kNoRow || (data.bodies.empty() && !stands_alone(*edits[slot].edit))))
+        return;
     std::vector<uint32_t> left;
     if (const auto was = mover_of.find(slot); was != mover_of.end()) {
         left = movers.at(was->second).slots;
@@ -211,7 +246,7 @@ void World::Impl::find_movers() {
         }
     }
     edits.each([&](uint32_t slot) {
-        if (edits[slot].edit->dynamic && !mover_of.contains(slot)) add_mover(*mover_at(slot));
+        if (stands_alone(*edits[slot].edit) && !mover_of.contains(slot)) add_mover(*mover_at(slot));
     });
     // The list was compiled from the scene; what had been moved goes back to where it was.
     for (auto& [key, m] : movers) {
@@ -298,7 +333,8 @@ Result<void> World::Impl::instances_of(float field_voxel, field::DistanceFormat 
             m.bricks_for = field_voxel;
         }
         m.drawn_as = uint32_t(out.size());
-        out.push_back({.bricks = m.bricks, .pose = m.pose, .before = m.before, .material = m.material});
+        out.push_back(
+            {.bricks = m.bricks, .pose = m.pose, .before = m.before, .material = m.material, .glass = m.glass});
         if (shows) m.before = m.pose;
     }
     std::erase_if(brick_sets, [](const auto& known) { return known.second.expired(); });
@@ -329,7 +365,8 @@ Result<void> World::move(EditId id, const Pose& pose) {
     const uint32_t slot = m.edits.find(id);
     if (slot == EditList::kNone) return Error{"move: the edit is gone", ErrorKind::Usage};
     const auto found = m.mover_of.find(slot);
-    if (found == m.mover_of.end())
+    if (found == m.mover_of.end() ||
+        (m.movers.at(found->second).body == Mover::kNoBody && !m.edits[slot].edit->dynamic))
         return Error{
             m.edits[slot].edit->name + ": only bodies and dynamic edits are moved; make it dynamic, or change the edit",
             ErrorKind::Usage};

@@ -10,12 +10,26 @@
 
 #include "render/passes/instance_rays.glsl"
 
-uint field_cell(ivec3 c) {
+// Slots count from the set's first in the map, in field_… from the atlas' first.
+uint cell_of_set(ivec3 c) {
     return instance_cells[int(here.cells_first) + cell_word_index(c.x, c.y, c.z, (here.grid.size_x + kCellPage - 1) >> 3, (here.grid.size_y + kCellPage - 1) >> 3)];
 }
-// Slots count from the set's first in the map, in field_… from the atlas' first.
+#ifdef KILN_FROM_INSIDE
+bool inside_out = true;  // the object is the air, and the air solid
+uint field_cell(ivec3 c) {
+    uint word = cell_of_set(c);
+    return inside_out && (word & kCellOccupied) == 0u ? word ^ kCellInside : word;
+}
+Corners field_corners(int slot, ivec3 voxel) {
+    Corners c = brick_corners(slot + int(here.slot_first), voxel);
+    return inside_out ? Corners(-c.v000, -c.v100, -c.v010, -c.v110, -c.v001, -c.v101, -c.v011, -c.v111) : c;
+}
+bool field_voxel_solid(int slot, ivec3 voxel) { return inside_out || brick_voxel_solid(slot + int(here.slot_first), voxel); }
+#else
+uint field_cell(ivec3 c) { return cell_of_set(c); }
 Corners field_corners(int slot, ivec3 voxel) { return brick_corners(slot + int(here.slot_first), voxel); }
 bool field_voxel_solid(int slot, ivec3 voxel) { return brick_voxel_solid(slot + int(here.slot_first), voxel); }
+#endif
 void field_enter(uint word, ivec3 texel) {}
 #include "field/march.gpu.h"
 
@@ -29,7 +43,14 @@ int field_slot(ivec3 cell) {
     uint word = field_cell(c);
     return (word & kCellOccupied) != 0u ? int(word & kCellSlotMask) : -1;
 }
+#ifdef KILN_FROM_INSIDE
+float field_texel(int slot, ivec3 texel) {
+    float d = brick_texel(slot + int(here.slot_first), texel);
+    return inside_out ? -d : d;
+}
+#else
 float field_texel(int slot, ivec3 texel) { return brick_texel(slot + int(here.slot_first), texel); }
+#endif
 uint field_material(int slot, ivec3 texel) { return brick_material(slot + int(here.slot_first), texel); }
 #include "field/surface.gpu.h"
 #endif

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
+#include "render/passes/forward.h"
 #include "render/passes/instances.h"
 #include "render/passes/passes.h"
 
 #include "shaders/light.spv.h"
+#include "shaders/light_glass.spv.h"
 
 namespace kiln::render {
 
@@ -13,7 +15,13 @@ constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
 const Kernel kLight{"light", kLightSpv};
 const Kernel kLightImage{"light image", kLightSpv, kWithImage};
 
-const Kernel& light_kernel(const TileInputs& in) { return in.image_sky ? kLightImage : kLight; }
+const Kernel kLightGlass{"light glass", kLightGlassSpv};
+const Kernel kLightGlassImage{"light glass image", kLightGlassSpv, kWithImage};
+
+const Kernel& light_kernel(const TileInputs& in) {
+    if (in.has_glass) return in.image_sky ? kLightGlassImage : kLightGlass;
+    return in.image_sky ? kLightImage : kLight;
+}
 
 Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface) {
     const Buffer masks = cluster(g, in, visibility);
@@ -29,11 +37,13 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
         Image fractions = shadow(g, in, visibility, surface, masks, push);
         shadow_instances(g, in, visibility, surface, masks, first, fractions);
         if (in.has_meshes) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
-        g.dispatch(light_kernel(in), in.size,
-                   {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(in.ggx_table),
-                    g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions), g.read(masks),
-                    g.read_write(sums), g.write(radiance)},
-                   push);
+        std::vector<Image> tints;
+        if (in.has_glass) tints = shadow_glass(g, in, visibility, surface, masks, first, fractions);
+        std::vector<Use> uses{g.uniform(in.frame),    g.read(in.rays),    g.read(in.lights),     g.read(in.ggx_table),
+                              g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions),
+                              g.read(masks),          g.read_write(sums), g.write(radiance)};
+        for (const Image& tint : tints) uses.push_back(g.read(tint));
+        g.dispatch(light_kernel(in), in.size, uses, push);
         first = next;
     } while (first < in.lights_of_tile);
     return radiance;

@@ -11,6 +11,9 @@
 #define march_brick set_march_brick
 #define texel_plane_crossing set_texel_plane_crossing
 #define cell_at set_cell_at
+#define march_start set_march_start
+#define march_miss set_march_miss
+#define march_cell set_march_cell
 #define field_march set_march
 #define KILN_INSTANCE_WALK
 #include "render/passes/instances.glsl"
@@ -22,6 +25,9 @@
 #undef march_brick
 #undef texel_plane_crossing
 #undef cell_at
+#undef march_start
+#undef march_miss
+#undef march_cell
 #undef field_march
 
 struct SetHit {

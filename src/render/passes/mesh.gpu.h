@@ -32,10 +32,11 @@ struct MeshPart {
     uint node_count;
     uint flags;  // kMesh…
     uint triangle_count;
-    uint pad_0;
+    uint outline;  // number of its mesh among the outlined ones, plus one; 0: it is not outlined
 };
 KILN_CONST uint kMeshDoubleSided = 1u;
-KILN_CONST uint kMeshMask = 2u;  // holes where alpha is less than the cutoff
+KILN_CONST uint kMeshMask = 2u;    // holes where alpha is less than the cutoff
+KILN_CONST uint kMeshBlend = 16u;  // alpha is the share that it covers
 
 KILN_CONST uint kMeshClosed = 4u;    // every edge is shared by two triangles that run along it opposite ways
 KILN_CONST uint kMeshMirrored = 8u;  // its place in the world turns it inside out

@@ -40,16 +40,20 @@ void main() {
     if ((seen.y >> 28u) != kSeenMesh) return;
     MeshPart part = mesh_parts[seen.z];
     uint triangle = seen.y & 0x0fffffffu;
-    vec3 p[3];
+    TexelRay ray = pixel_ray(pixel);
+    vec3 from = ray_origin(ray);
+    vec3 p[3];  // from where the ray starts
     for (uint i = 0u; i < 3u; ++i) {
         corners[i] = mesh_corner(part, triangle, i);
-        p[i] = mesh_point(part, vertex_position(corners[i]));
+        p[i] = mesh_point(part, vertex_position(corners[i])) - from;
     }
-    vec3 d = pixel_ray(pixel).direction;
+    vec3 d = ray.direction;
     weights = mesh_weights_inside(p[0], p[1], p[2], d);
+    // A ray from elsewhere turns from pixel to pixel about as the camera's do.
     ivec2 whole = pixel + ivec2(frame.tile_x, frame.tile_y);
-    weights_x = mesh_weights(p[0], p[1], p[2], camera_direction(whole + ivec2(1, 0)));
-    weights_y = mesh_weights(p[0], p[1], p[2], camera_direction(whole + ivec2(0, 1)));
+    vec3 turned = (frame.flags & kFrameRays) != 0u ? d - camera_direction(whole) : vec3(0.0);
+    weights_x = mesh_weights(p[0], p[1], p[2], camera_direction(whole + ivec2(1, 0)) + turned);
+    weights_y = mesh_weights(p[0], p[1], p[2], camera_direction(whole + ivec2(0, 1)) + turned);
 
     MeshSurface look_of = mesh_surfaces[part.surface];
     vec4 color = weights.x * vertex_color(corners[0]) + weights.y * vertex_color(corners[1]) + weights.z * vertex_color(corners[2]);
@@ -90,6 +94,9 @@ void main() {
         n = unit_or(tangent * bump.x + bitangent * bump.y + n * bump.z, n);
     }
     s.normal = dot(face, d) > 0.0 ? -n : n;  // seen from behind
-    imageStore(surface_words, pixel, pack_surface(s));
+    uvec4 words = pack_surface(s);
+    // The share that it covers, for through_bend.comp.
+    if ((part.flags & kMeshBlend) != 0u) words.x |= uint(clamp(color.a * look_of.alpha * texels[0].a, 0.0, 1.0) * 255.0 + 0.5) << 24u;
+    imageStore(surface_words, pixel, words);
     imageStore(depth, pixel, vec4(uintBitsToFloat(seen.x) * frame.grid.voxel_size));
 }

@@ -273,7 +273,8 @@ void main() {
         TexelRay ray = pixel_ray(pixel);
         float h = frame.grid.voxel_size;
         float t = uintBitsToFloat(seen.x) * h;
-        from = ray.direction * t;
+        vec3 origin = ray_origin(ray);
+        from = origin + ray.direction * t;
         // As far off the surface as floats of its place, and of bricks, may be wrong.
         float off = 4e-6 * max(t, 0.1);
         vec3 outwards = surface.normal;
@@ -288,7 +289,7 @@ void main() {
                 p[i] = mesh_point(part, vertex_position(v));
                 n[i] = normalize(mesh_normal(part, unpack_unit(mesh_vertices[v].normal)));
             }
-            vec3 w = mesh_weights_inside(p[0], p[1], p[2], ray.direction);
+            vec3 w = mesh_weights_inside(p[0] - origin, p[1] - origin, p[2] - origin, ray.direction);
             from = w.x * p[0] + w.y * p[1] + w.z * p[2];
             outwards = cross(p[1] - p[0], p[2] - p[0]);
             float size = length(outwards);

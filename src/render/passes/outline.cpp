@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "render/passes/forward.h"
 #include "render/passes/outline.gpu.h"
 #include "field/brick_set.h"
 #include "render/passes/passes.h"
@@ -88,7 +89,14 @@ Image outline_flood(Graph& g, const Buffer& records, const OutlineMask& mask, fl
 }
 
 Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Image& shown) {
-    const OutlineMask mask = outline_mask(g, in, visibility);
+    OutlineMask mask;
+    if (in.outline_count > 0) {
+        mask = outline_mask(g, in, visibility);
+    } else {
+        mask.owners = g.create("outline owners", {.size = in.size, .format = rhi::Format::R32Uint});
+        mask.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
+    }
+    mark_meshes(g, in, visibility, in.outline_count, mask);
     const Image seeds = outline_flood(g, in.outlines, mask, in.widest_outline);
     Image out = g.create("shown outlined", {.size = shown.size, .format = rhi::Format::Rgba8Unorm});
     g.dispatch(kOutlineDraw, shown.size,

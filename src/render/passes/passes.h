@@ -9,12 +9,15 @@
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/frame.gpu.h"
+#include "render/passes/lines.gpu.h"
 #include "render/passes/outline.gpu.h"
+#include "render/passes/particles.gpu.h"
 #include "render/passes/shadow.gpu.h"
 #include "render/passes/tape_use.h"
 
 #include <kiln/renderer.h>
 
+#include <array>
 #include <vector>
 
 namespace kiln::render {
@@ -22,7 +25,8 @@ namespace kiln::render {
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kResolve,
     kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
-    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kTonemap, kView;
+    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kLightGlass, kLightGlassImage, kTonemap,
+    kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow, kMeshShadowHoles;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
@@ -54,6 +58,28 @@ struct MovedHandles {
     OwnerHandles owners;
     Buffer edits, boxes;  // MovedRecord of each owner; ChangedBox
     bool has_boxes = false;
+};
+// A frame's debug lines; none: count 0.
+struct LineHandles {
+    Buffer lines;  // LineRecord
+    Block params;  // LineParams
+    uint32_t count = 0;
+};
+
+// A frame's particles, see particle_bins.h; none: count 0.
+struct ParticleHandles {
+    Buffer records, ends, numbers;
+    uint32_t count = 0;
+    std::array<uint32_t, size_t(kParticleLevels)> first_level{}, across{};
+};
+
+// A part of a tile, behind whose pixels something may let light through: a picture of its own, whose rays then go elsewhere.
+struct ThroughPart {
+    int x = 0, y = 0;  // its first pixel in the tile
+    rhi::Extent size;
+    Block frame, frame_of_rays;  // FrameParams, by the camera's rays and by given ones
+    Buffer light_rects;          // for the camera's rays
+    uint32_t lights_of_tile = 0;
 };
 
 // What every pass of one tile reads.
@@ -102,6 +128,17 @@ struct TileInputs {
     bool mesh_shader = false;  // clusters of meshes are drawn by a mesh shader
     MovedHandles moved;        // with taa
     bool mesh_holes = false;
+    bool has_lines = false;
+    LineHandles lines;
+    bool has_glass = false;   // instances that light goes through
+    bool has_blends = false;  // likewise of meshes
+    int transparent_layers = 0;
+    std::vector<ThroughPart> through;
+    bool outlines_meshes = false;  // their records follow those of edits
+    bool outline_hulls = false;    // … or are not used: see draw_hulls()
+    bool has_particles = false;
+    ParticleHandles particles;
+    Buffer all_light_rects;  // LightRect a light, all of any picture; where `through` is not empty
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

@@ -21,3 +21,8 @@ TexelRay pixel_ray(ivec2 pixel) {
     return texel_ray(ivec3(frame.eye_x, frame.eye_y, frame.eye_z), vec3(frame.eye_part_x, frame.eye_part_y, frame.eye_part_z),
                      camera_direction(pixel + ivec2(frame.tile_x, frame.tile_y)));
 }
+
+// Metres from the eye to where a ray starts: 0 for the camera's.
+vec3 ray_origin(TexelRay ray) {
+    return (vec3(ray.whole - ivec3(frame.eye_x, frame.eye_y, frame.eye_z)) + (ray.part - vec3(frame.eye_part_x, frame.eye_part_y, frame.eye_part_z))) * frame.grid.voxel_size;
+}

@@ -19,12 +19,12 @@ Image motion(Graph& g, const TileInputs& in, const Image& visibility) {
         owners = g.create("no owners", {.size = {1, 1}, .format = rhi::Format::R32Uint});
         g.clear(owners);
     }
-    g.dispatch(
-        kMotion, in.size,
-        {g.uniform(in.frame), g.uniform(in.motion), g.read(in.rays), g.read(visibility), g.write(out),
-         g.read(in.instances ? in.instances.instances : in.rays), g.read(in.has_meshes ? in.meshes.parts : in.rays),
-         g.read(in.moved.owners.count != 0 ? in.moved.edits : in.rays),
-         g.read(in.moved.has_boxes ? in.moved.boxes : in.rays), g.read(owners)});
+    g.dispatch(kMotion, in.size,
+               {g.uniform(in.frame), g.uniform(in.motion), g.read(in.rays), g.read(visibility), g.write(out),
+                g.read(in.instances.any() ? in.instances.instances : in.rays),
+                g.read(in.has_meshes ? in.meshes.parts : in.rays),
+                g.read(in.moved.owners.count != 0 ? in.moved.edits : in.rays),
+                g.read(in.moved.has_boxes ? in.moved.boxes : in.rays), g.read(owners)});
     return out;
 }
 

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT
+// Passes behind the light of what is solid: what lets light through, particles, debug lines. They read its depth and write none.
+#pragma once
+
+#include "render/passes/passes.h"
+
+namespace kiln::render {
+
+extern const RasterKernel kLines, kOutlineHull;
+extern const Kernel kLinesOver, kOutlineMeshes;
+extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend,
+    kThroughEnd, kThroughFront, kMeshTrace, kShadowGlass;
+extern const Kernel kParticles, kParticlesLight, kParticlesLightImage;
+
+// What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.
+struct Front {
+    Surface surface;
+    Image light;  // of that alone
+    Image left;   // share of light from behind it that comes through
+};
+// Radiance with what lets light through.
+Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image& radiance);
+// What glass leaves of lights first_light … + 15: the fractions are less by it, and the colours that the light pass takes.
+std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
+                                const Buffer& light_masks, uint32_t first_light, Image& fractions);
+void through_kernels(const TileInputs& in, std::vector<const Kernel*>& out);
+
+// Radiance with particles. With taa, depth and motion are theirs where they hide more than half of what is behind.
+void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Front& front, Image& radiance,
+                    Image& motion);
+
+// Meshes with an outline into the mask; their records follow `records_before` others.
+void mark_meshes(Graph& g, const TileInputs& in, const Image& visibility, uint32_t records_before, OutlineMask& mask);
+// The finished picture with outlines of meshes by a stencil and larger hulls; see outline_hull.vert.
+Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const Image& shown);
+// The finished picture with something over it: colour times share, and share.
+Image lay_over(Graph& g, const TileInputs& in, const Image& drawn, const Image& shown);
+
+// As kernels see them, counted from the eye; those that are not finite are left out.
+std::vector<LineRecord> line_records(std::span<const DebugLine> lines, vec3 eye);
+// The finished picture with the frame's lines. `depth`: metres along the ray.
+Image draw_lines(Graph& g, const TileInputs& in, const Image& depth, const Image& shown);
+
+}  // namespace kiln::render

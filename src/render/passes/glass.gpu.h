@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// What lets light through, as kernels see it. Kernels include frame.gpu.h first.
+
+#ifdef __cplusplus
+#pragma once
+#include "render/passes/frame.gpu.h"
+namespace kiln::render {
+#endif
+
+// By the number of the instance; 0 of those that are solid. As large as an InstanceNode: shadow_glass.comp reads both from one buffer.
+struct GlassRecord {
+    float ior;
+    float opacity;       // share of light that stays outside
+    float absorbed_red;  // a metre: light falls as exp(-absorbed metres)
+    float pad_0;
+    float absorbed_green, absorbed_blue;
+    float pad_1, pad_2;
+};
+
+// What a pixel's ray does, beside the share of light that it brings.
+KILN_CONST float kRayRests = 0.0f;  // nothing: its light is summed up
+KILN_CONST float kRayGoes = 1.0f;
+KILN_CONST float kRayEnds = 2.0f;  // it meets something solid next, inside glass
+
+// A part of the tile where something may let light through, a picture of its own.
+struct ThroughPush {
+    int from_x, from_y;  // its first pixel in the tile
+    int width, height;
+    uint passed;  // surfaces that rays have passed before
+    uint last;    // 1: what else lets light through is not looked at
+    uint pad_0, pad_1;
+};
+
+struct MeshTracePush {
+    uint through;  // 1: what blends is looked for, 0: what is solid
+    uint pad_0, pad_1, pad_2;
+};
+
+#ifdef __cplusplus
+static_assert(sizeof(GlassRecord) == 32 && sizeof(ThroughPush) == 32 && sizeof(MeshTracePush) == 16);
+}  // namespace kiln::render
+#endif

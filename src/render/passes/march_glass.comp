@@ -1,0 +1,64 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// Glass along rays, where it is nearer than what was found before: the ray goes down its tree and into each object's bricks. Of equals the lower
+// number. An eye inside glass sees out of it unbent.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#include "render/passes/instances.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
+layout(set = 0, binding = 3, std430) readonly buffer Nodes { InstanceNode nodes[]; };  // of glass
+layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 7) uniform texture3D distances;
+layout(set = 0, binding = 8) uniform utexture2D seen_before;
+layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D visibility;
+layout(push_constant) uniform Push { InstancePush push; };
+
+#define KILN_INSTANCE_WALK
+#include "render/passes/instances.glsl"
+#include "render/passes/rays.glsl"
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    uvec4 seen = texelFetch(seen_before, pixel, 0);
+    TexelRay ray = pixel_ray(pixel);
+    vec3 from = from_eye(ray);
+    vec3 inverse = walk_inverse(ray.direction);
+    float nearest = uintBitsToFloat(seen.x);
+    uint nearest_instance = kNoInstance;
+    uint at = 0u;
+    while (at < push.node_count) {
+        // To the next leaf first, so that rays that are in step march together.
+        uint found = kNoInstance;
+        while (at < push.node_count && found == kNoInstance) {
+            InstanceNode node = nodes[at];
+            bool meets = walk_meets(node, from, inverse, nearest);
+            at = meets ? at + 1u : node.skip;
+            if (meets) found = node.instance;
+        }
+        if (found == kNoInstance) break;
+        InstanceRecord instance = instances[found];
+        here = sets[instance.set];
+        // A little beyond the nearest, so that of equals the lower number is found.
+        float t_end = nearest < kFarVoxels ? nearest * instance.voxels * 1.000001 : kFarVoxels;
+        MarchHit hit = field_march(here.grid, object_ray(instance, from, ray.direction), 0.0, t_end, true);
+        if (hit.state != kMarchHit || hit.t <= 0.0) continue;
+        float t = hit.t / instance.voxels;
+        if (t < nearest || (t == nearest && found < nearest_instance && nearest_instance != kNoInstance)) {
+            nearest = t;
+            nearest_instance = found;
+            seen.x = floatBitsToUint(t);
+            seen.y = (kSeenInstance << 28u) | found;
+            seen.z = uint(hit.voxel.x | (hit.voxel.y << 3) | (hit.voxel.z << 6)) | (uint(hit.slot) << kInstanceSlotShift);
+        }
+    }
+    imageStore(visibility, pixel, seen);
+}

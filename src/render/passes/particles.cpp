@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: MIT
+#include "render/passes/forward.h"
+
+#include "shaders/particles.spv.h"
+#include "shaders/particles_light.spv.h"
+
+#include <algorithm>
+
+namespace kiln::render {
+
+namespace {
+constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
+}  // namespace
+
+const Kernel kParticles{"particles", kParticlesSpv};
+const Kernel kParticlesLight{"particles light", kParticlesLightSpv};
+const Kernel kParticlesLightImage{"particles light image", kParticlesLightSpv, kWithImage};
+
+void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Front& front, Image& radiance,
+                    Image& motion) {
+    const ParticleHandles& p = in.particles;
+    if (p.count == 0) return;
+    ParticlePush push{};
+    push.width = int(in.size.width), push.height = int(in.size.height);
+    push.count = p.count;
+    std::copy(p.first_level.begin(), p.first_level.end(), push.first_level);
+    std::copy(p.across.begin(), p.across.end(), push.across);
+    push.behind = in.through.empty() ? 0 : 1;
+    push.moves = in.taa ? 1 : 0;
+    Buffer light = g.create_buffer("particles light", uint64_t{p.count} * 4 * sizeof(float));
+    g.dispatch(in.image_sky ? kParticlesLightImage : kParticlesLight, rhi::Extent{p.count, 1},
+               {g.uniform(in.frame), g.read(p.records), g.read(in.lights), g.read(in.environment), g.write(light)},
+               push);
+    // Without taa one pixel stands for what is not written.
+    const rhi::Extent size = in.taa ? in.size : rhi::Extent{1, 1};
+    Image out = g.create("radiance with particles", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    Image depth_now = g.create("front depth", {.size = size, .format = rhi::Format::R32Float});
+    Image motion_now = g.create("motion", {.size = size, .format = rhi::Format::Rgba16Float});
+    g.dispatch(
+        kParticles, in.size,
+        {g.uniform(in.frame), g.uniform(in.motion), g.read(p.records), g.read(light), g.read(p.ends), g.read(p.numbers),
+         g.read(radiance), g.read(solid_depth), g.read(front.surface.depth), g.read(front.light), g.read(front.left),
+         g.read(motion), g.write(out), g.write(depth_now), g.write(motion_now)},
+        push);
+    radiance = out;
+    if (!in.taa) return;
+    front.surface.depth = depth_now;
+    motion = motion_now;
+}
+
+}  // namespace kiln::render

@@ -1,0 +1,123 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// What glass leaves of each light, along the straight line to its middle: less what both surfaces reflect and keep out, and what the way absorbs.
+// Caustics are not made: light that a lens sends elsewhere is missed here and found nowhere.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#include "render/passes/glass.gpu.h"
+#include "render/passes/instances.gpu.h"
+#include "render/passes/shadow.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
+layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights[]; };
+layout(set = 0, binding = 3, std430) readonly buffer LightMasks { uint light_masks[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Instances { InstanceRecord instances[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Sets { InstanceSet sets[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Nodes { InstanceNode nodes[]; };  // of glass; then the GlassRecord of every instance
+layout(set = 0, binding = 7, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 8, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 9) uniform texture3D distances;
+layout(set = 0, binding = 10) uniform utexture2D visibility;
+layout(set = 0, binding = 11) uniform utexture2D surface_words;
+layout(set = 0, binding = 12) uniform utexture2D fractions_before;
+layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 14, rgba32ui) writeonly uniform uimage2D tints_low;
+layout(set = 0, binding = 15, rgba32ui) writeonly uniform uimage2D tints_high;
+layout(push_constant) uniform Push { InstancePush push; };
+
+#define KILN_FROM_INSIDE
+#define KILN_INSTANCE_WALK
+#include "render/lib/glass.gpu.h"
+#include "render/passes/instances.glsl"
+#include "render/passes/rays.glsl"
+#include "render/passes/light_walk.glsl"
+#include "render/passes/surface.glsl"
+#include "render/passes/glass_tint.glsl"
+
+// A kernel has eight buffers; a record is as large as a node.
+GlassRecord glass_of(uint instance) {
+    InstanceNode n = nodes[push.node_count + instance];
+    return GlassRecord(n.low_x, n.low_y, n.low_z, 0.0, n.high_x, n.high_y, 0.0, 0.0);
+}
+
+// Of one object; `ray` in its voxels, up to t_last.
+vec3 left_by_object(GlassRecord g, TexelRay ray, float t_last, float metres_a_voxel) {
+    vec3 left = vec3(1.0);
+    float t = 0.0;
+    inside_out = false;
+    for (int surfaces = 0; surfaces < 16; ++surfaces) {
+        MarchHit hit = field_march(here.grid, ray, t, t_last, true);
+        float way = (hit.state == kMarchMiss ? t_last : hit.t) - t;
+        if (inside_out) left *= exp(-vec3(g.absorbed_red, g.absorbed_green, g.absorbed_blue) * (way * metres_a_voxel));
+        if (hit.state == kMarchMiss) break;
+        // Where the way begins inside, no surface is crossed.
+        if (hit.state == kMarchHit && (way > 1e-3 || surfaces > 0)) {
+            vec3 gradient = trilinear_gradient(field_corners(hit.slot, hit.voxel), hit.p);
+            float cosine = abs(dot(gradient, ray.direction)) / max(length(gradient), 1e-20);
+            left *= 1.0 - dielectric_reflectance(min(cosine, 1.0), 1.0 / g.ior);
+            if (!inside_out) left *= 1.0 - g.opacity;
+        }
+        inside_out = !inside_out;
+        t = hit.t + 0.02;
+    }
+    return left;
+}
+
+// From a point of a surface, counted from the eye in finest voxels.
+vec3 through_glass(vec3 p, vec3 n, vec3 l, float t_last) {
+    vec3 left = vec3(1.0);
+    vec3 inverse = walk_inverse(l);
+    uint at = 0u;
+    while (at < push.node_count) {
+        InstanceNode node = nodes[at];
+        bool meets = walk_meets(node, p, inverse, t_last);
+        at = meets ? at + 1u : node.skip;
+        if (!meets || node.instance == kNoInstance) continue;
+        InstanceRecord instance = instances[node.instance];
+        here = sets[instance.set];
+        // Off the surface by as much as its own bricks may be wrong.
+        TexelRay ray = object_ray(instance, p + n * (1.0 / instance.voxels), l);
+        left *= left_by_object(glass_of(node.instance), ray, min(t_last * instance.voxels, kFarVoxels), frame.grid.voxel_size / instance.voxels);
+    }
+    return left;
+}
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
+    uvec4 seen = texelFetch(visibility, pixel, 0);
+    uvec4 fractions = texelFetch(fractions_before, pixel, 0);
+    uvec4 low = uvec4(0xffffffffu);
+    uvec4 high = uvec4(0xffffffffu);
+    uint state = seen.y >> 28u;
+    if (state != kSeenNothing && state != kSeenInside && fractions != uvec4(0u)) {
+        TexelRay ray = pixel_ray(pixel);
+        vec3 n = unpack_surface(texelFetch(surface_words, pixel, 0)).normal;
+        vec3 p = from_eye(ray) + ray.direction * uintBitsToFloat(seen.x);
+        vec3 p_world = seen_point(ray, seen);
+        LightWalk walk = light_walk(pixel, push.first_light);
+        for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
+            uint index = next_light(walk);
+            if (index == kNoLight) break;
+            float before = visible_fraction(fractions, channel);
+            if (before <= 0.0) continue;
+            LightSample light = sample_light(lights[index], p_world);
+            vec3 left = through_glass(p, n, light.l, light.distance / frame.grid.voxel_size);
+            float most = max(left.r, max(left.g, left.b));
+            if (most >= 1.0) continue;
+            set_visible_fraction(fractions, channel, before * most);
+            if (channel < 8u) {
+                pack_tint(low, channel, left / max(most, 1e-20));
+            } else {
+                pack_tint(high, channel & 7u, left / max(most, 1e-20));
+            }
+        }
+    }
+    imageStore(visible_fractions, pixel, fractions);
+    imageStore(tints_low, pixel, low);
+    imageStore(tints_high, pixel, high);
+}

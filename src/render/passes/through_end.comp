@@ -1,0 +1,19 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// The part back into the tile.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#include "render/passes/glass.gpu.h"
+
+layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
+
+layout(set = 0, binding = 0) uniform texture2D sum;
+layout(set = 0, binding = 1, rgba16f) writeonly uniform image2D tile_radiance;
+layout(push_constant) uniform Push { ThroughPush push; };
+
+void main() {
+    ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+    if (pixel.x >= push.width || pixel.y >= push.height) return;
+    imageStore(tile_radiance, pixel + ivec2(push.from_x, push.from_y), texelFetch(sum, pixel, 0));
+}

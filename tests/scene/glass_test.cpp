@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: MIT
+// Glass in worlds: what stands apart from what is solid, what questions see of it, and pictures against the path tracer's.
+#include "field/brick_set.h"
+#include "image/metrics.h"
+#include "sdf/program.h"
+
+#include <kiln/world.h>
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+#include <string_view>
+
+namespace kiln {
+namespace {
+
+constexpr const char* kMaterials =
+    R"("materials": {"clear": {"opacity": 0.01, "roughness": 0.05}, "amber": {"opacity": 0.05, "ior": 1.54, "roughness": 0.1,
+        "attenuation_color": [0.9, 0.5, 0.1], "attenuation_distance": 0.1}, "clay": {"base_color": [0.7, 0.3, 0.2]}})";
+
+World world_of(const std::string& edits, const std::string& rest = "") {
+    auto world = World::parse(
+        std::string(
+            R"({"format": 1, "field": {"voxel_size": 0.04, "bounds": {"min": [-2, -2, -2], "max": [2, 2, 2]}}, )") +
+            kMaterials +
+            R"(, "objects": {"jar": {"op": "subtract", "material": "clear", "children": [
+                                  {"shape": "cylinder", "half_height": 0.5, "radius": 0.4}, {"shape": "cylinder", "half_height": 0.5, "radius": 0.3, "position": [0, 0.1, 0]}]}},
+                              "edits": [)" +
+            edits + "]" + rest + "}",
+        "test.kiln.json");
+    EXPECT_TRUE(world) << (world ? "" : world.error().message);
+    return world ? std::move(*world) : World();
+}
+
+int count_glass(const World& world) {
+    const auto frame = world.frame();
+    EXPECT_TRUE(frame) << (frame ? "" : frame.error().message);
+    int out = 0;
+    for (const Instance& i : frame->instances) out += i.glass != 0 && frame->materials[i.glass].opacity < 1;
+    return out;
+}
+
+constexpr const char* kBlock =
+    R"({"id": "block", "shape": "box", "half_extents": [0.6, 0.2, 0.6], "position": [0, -1, 0], "material": "clay"})";
+constexpr const char* kBall = R"({"id": "ball", "shape": "sphere", "radius": 0.5, "material": "amber")";
+
+TEST(WorldGlass, StandsApartFromWhatIsSolid) {
+    EXPECT_EQ(count_glass(world_of(kBlock)), 0);
+    EXPECT_EQ(count_glass(world_of(std::string(kBlock) + ", " + kBall + "}")), 1);
+    EXPECT_EQ(count_glass(world_of(std::string(kBlock) + R"(, {"id": "jar", "object": "jar"})")), 1);
+    EXPECT_EQ(count_glass(world_of(std::string(kBlock) + R"(, {"id": "jar", "object": "jar", "material": "clay"})")), 1)
+        << "the tree's own";
+    // The field is what it is without it, and questions see it.
+    const World with = world_of(std::string(kBlock) + ", " + kBall + "}"), without = world_of(kBlock);
+    const auto a = with.frame(), b = without.frame();
+    ASSERT_TRUE(a && b);
+    EXPECT_EQ(a->field->stats().bricks, b->field->stats().bricks);
+    EXPECT_NEAR(with.distance({0, 0.7f, 0}), 0.2f, 1e-5f);
+    // What blends with it, or cuts it later, makes one with it: that is drawn as solid.
+    EXPECT_EQ(count_glass(
+                  world_of(std::string(kBlock) + ", " + kBall + R"(, "blend_radius": 0.1, "position": [0, -0.5, 0]})")),
+              0);
+    EXPECT_EQ(count_glass(world_of(
+                  std::string(kBall) +
+                  R"(}, {"id": "cut", "op": "subtract", "shape": "sphere", "radius": 0.3, "position": [0, 0.5, 0]})")),
+              0);
+    EXPECT_EQ(count_glass(world_of(
+                  std::string(kBall) +
+                  R"(}, {"id": "cut", "op": "subtract", "shape": "sphere", "radius": 0.3, "position": [0, 1.5, 0]})")),
+              1);
+}
+
+TEST(WorldGlass, FollowsWhatItsMaterialBecomes) {
+    World world = world_of(std::string(kBlock) + ", " + kBall + "}");
+    ASSERT_EQ(count_glass(world), 1);
+    world.add_material("amber", {.opacity = 1});
+    EXPECT_EQ(count_glass(world), 0);
+    const auto solid = world.frame();
+    ASSERT_TRUE(solid);
+    world.add_material("amber", {.opacity = 0.5f});
+    EXPECT_EQ(count_glass(world), 1);
+    const auto glass = world.frame();
+    EXPECT_LT(glass->field->stats().bricks, solid->field->stats().bricks);
+}
+
+TEST(WorldGlass, OfABodyIsGlassWhereAllOfItIs) {
+    const std::string body = R"(, "bodies": [{"id": "b", "edits": ["ball", "other"], "motion": "dynamic"}])";
+    const auto other = [](const char* material) {
+        return std::string(
+                   R"(}, {"id": "other", "shape": "box", "half_extents": [0.2, 0.2, 0.2], "position": [0.5, 0, 0], "material": ")") +
+               material + "\"}";
+    };
+    EXPECT_EQ(count_glass(world_of(std::string(kBlock) + ", " + kBall + other("clear"), body)), 1);
+    EXPECT_EQ(count_glass(world_of(std::string(kBlock) + ", " + kBall + other("clay"), body)), 0);
+}
+
+// The left half of a picture as it is shown, or the right one.
+image::Rgb shown(const Picture& p, bool right) {
+    image::Rgb out{p.width / 2, p.height, {}};
+    for (int y = 0; y < p.height; ++y) {
+        for (int x = 0; x < p.width / 2; ++x) {
+            const uint8_t* c = &p.srgb[size_t(y * p.width + x + (right ? p.width / 2 : 0)) * 4];
+            for (int k = 0; k < 3; ++k) out.values.push_back(float(c[k]) / 255);
+        }
+    }
+    return out;
+}
+
+// Things that glow on their own behind and before glass: the path tracer's bounces between solid things would tell the two apart otherwise.
+TEST(GlassGpu, LooksAsThePathTracerSays) {
+    auto renderer = Renderer::create({.validation = true});
+    if (!renderer) {
+        const char* required = std::getenv("REQUIRE_VULKAN");
+        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << renderer.error().message;
+        GTEST_SKIP() << renderer.error().message;
+    }
+    const auto world = World::parse(
+        R"({"format": 1, "field": {"voxel_size": 0.03, "bounds": {"min": [-3, -1.2, -3], "max": [3, 2, 1.5]}},
+      "materials": {"a": {"base_color": [0, 0, 0], "emissive": [0.8, 0.2, 0.1], "roughness": 1}, "b": {"base_color": [0, 0, 0], "emissive": [0.1, 0.5, 0.7], "roughness": 1},
+        "c": {"base_color": [0, 0, 0], "emissive": [0.7, 0.6, 0.2], "roughness": 1},
+        "clear": {"opacity": 0.000001, "roughness": 0.0}, "amber": {"opacity": 0.000001, "roughness": 0.0, "attenuation_color": [0.9, 0.4, 0.2], "attenuation_distance": 0.4}},
+      "edits": [{"id": "1", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [-1.2, 0, -2], "material": "a"},
+        {"id": "2", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [0.2, 0.3, -2], "material": "b"},
+        {"id": "3", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [1.5, 0, -2], "material": "c"},
+        {"id": "4", "shape": "sphere", "radius": 0.2, "position": [0.5, -0.1, 0.2], "material": "c"},
+        {"id": "ball", "shape": "sphere", "radius": 0.6, "position": [-0.6, 0, 0], "material": "clear"},
+        {"id": "block", "shape": "rounded_box", "half_extents": [0.4, 0.5, 0.4], "rounding": 0.1, "position": [0.6, 0, 0.2], "rotation": [0, 0.2588190, 0, 0.9659258], "material": "amber"}],
+      "environment": {"color": [0.25, 0.3, 0.35]}, "lights": [{"type": "directional", "illuminance": 0}],
+      "cameras": {"main": {"position": [0, 0.3, 3.4], "target": [0, 0, 0], "fov_y_deg": 40, "tone_map": "neutral"}}})",
+        "test.kiln.json");
+    ASSERT_TRUE(world) << world.error().message;
+    const auto frame = world->frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    const RenderSettings settings{.width = 72, .height = 54};
+    // The same pixels' middles many times would need no anti-aliasing; a mean of sixteen places is near to the tracer's.
+    RenderSettings smooth = settings;
+    smooth.taa = true;
+    Picture fast;
+    for (int i = 0; i < 16; ++i) {
+        auto picture = renderer->render(*frame, smooth);
+        ASSERT_TRUE(picture) << picture.error().message;
+        fast = std::move(*picture);
+    }
+    const auto slow = render_reference(*frame, settings, 96);
+    ASSERT_TRUE(slow) << slow.error().message;
+    // Left a ball, right a block with something in it and many ways back and forth, of which one is followed. What both reflect is the sky alone.
+    EXPECT_LT(image::flip(shown(*slow, false), shown(fast, false)), 0.04);
+    EXPECT_LT(image::flip(shown(*slow, true), shown(fast, true)), 0.06);
+    // Glass is there at all.
+    Frame bare = *frame;
+    std::erase_if(bare.instances, [](const Instance& i) { return i.glass != 0; });
+    const auto without = renderer->render(bare, settings);
+    ASSERT_TRUE(without);
+    EXPECT_GT(image::flip(shown(*slow, false), shown(*without, false)), 0.1);
+    EXPECT_GT(image::flip(shown(*slow, true), shown(*without, true)), 0.1);
+}
+
+}  // namespace
+}  // namespace kiln
