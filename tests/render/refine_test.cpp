@@ -77,6 +77,34 @@ TEST_F(RefineGpu, PointsLieOnTheSurfaceAndHostAndDeviceAgree) {
     }
 }
 
+// Whatever other points of its brick are asked, and whatever was asked before.
+TEST_F(RefineGpu, APointIsRefinedAloneAsAmongOthers) {
+    // So far off that the step of a gradient follows from the place.
+    const field::worlds::World world{"far",
+                                     {field::worlds::edit(Sphere{.radius = 0.5f}, {49.7f, 0, 0}),
+                                      field::worlds::edit(Sphere{.radius = 0.4f}, {50.4f, 0.1f, 0}, Op::Union, 0.3f)},
+                                     {.voxel_size = 0.04f, .bounds = {{48.6f, -1.4f, -1.4f}, {51.4f, 1.4f, 1.4f}}}};
+    GpuField gpu(*runner_);
+    rhi::must(gpu.update(world.field(), Baker::Host));
+    Frame frame = frame_of(world, {50.9f, 0.7f, 1.1f});
+    frame.camera.target = {50, 0, 0};
+    const FrameParams p = rhi::must(frame_params(frame, {.width = 96, .height = 64, .accelerate = true}, gpu));
+    const Words all = refined(gpu, p);
+    int found = 0;
+    for (const size_t every : {1, 5, 37, 301}) {
+        std::vector<uint32_t> some = all.seen;
+        for (size_t i = 0; i < some.size() / 4; ++i)
+            if (i % every != 0) some[4 * i + 1] = kSeenNothing << 28;
+        const std::vector<uint32_t> alone = refine_on_host(gpu.code_of_bricks(), p, some);
+        for (size_t i = 0; i < some.size() / 4; i += every) {
+            found += alone[4 * i] != kNotRefined;
+            for (size_t word = 4 * i; word < 4 * i + 4; ++word)
+                ASSERT_EQ(alone[word], all.by_host[word]) << "pixel " << i << " of every " << every;
+        }
+    }
+    EXPECT_GT(found, 2000);
+}
+
 // Sand that dives into water: a point of the shore has the normal of what it is made of, however near the other is.
 TEST_F(RefineGpu, WhereMaterialsMeetEachKeepsItsNormal) {
     field::worlds::World shore;
