@@ -53,34 +53,42 @@ Box3 posed_box(const sdf::Program& object, const Pose& pose) {
 
 namespace {
 
-uint32_t glass_in(const scene::SceneData& data, const Node& node, const Object* of, MaterialId parents) {
-    const MaterialId own = node.material ? node.material : parents;
-    switch (node.kind) {
-    case Node::Kind::Shape:
-        return own && own.index < data.materials.size() && data.materials[own.index].second.opacity < 1
-                   ? sdf::material_number(own)
-                   : 0;
-    case Node::Kind::Object: {
-        const Object& object = data.objects[node.object.index];
-        return glass_in(data, object.nodes.front(), &object, own);
-    }
-    case Node::Kind::Fold:
-        break;
-    }
+// Number of the material of the first shape, if all shapes are of glass; else 0. Trees may be as deep as memory holds.
+uint32_t glass_in(const scene::SceneData& data, const Node& root) {
+    struct Visit {
+        const Node* node;
+        const Object* of;
+        MaterialId parents;
+    };
+    std::vector<Visit> todo{{&root, nullptr, {}}};
     uint32_t first = 0;
-    for (const uint32_t child : node.children) {
-        const uint32_t number = glass_in(data, of->nodes[child], of, own);
-        if (number == 0) return 0;
-        if (first == 0) first = number;
+    while (!todo.empty()) {
+        const auto [node, of, parents] = todo.back();
+        todo.pop_back();
+        const MaterialId own = node->material ? node->material : parents;
+        switch (node->kind) {
+        case Node::Kind::Shape:
+            if (!own || own.index >= data.materials.size() || !(data.materials[own.index].second.opacity < 1)) return 0;
+            if (first == 0) first = sdf::material_number(own);
+            break;
+        case Node::Kind::Object: {
+            const Object& object = data.objects[node->object.index];
+            todo.push_back({&object.nodes.front(), &object, own});
+            break;
+        }
+        case Node::Kind::Fold:
+            if (node->children.empty()) return 0;
+            for (auto child = node->children.rbegin(); child != node->children.rend(); ++child)
+                todo.push_back({&of->nodes[*child], of, own});
+            break;
+        }
     }
     return first;
 }
 
 }  // namespace
 
-uint32_t World::Impl::glass_of(const Edit& edit) const {
-    return edit.op == Op::Union ? glass_in(data, edit.node, nullptr, {}) : 0;
-}
+uint32_t World::Impl::glass_of(const Edit& edit) const { return edit.op == Op::Union ? glass_in(data, edit.node) : 0; }
 
 // Its edits as a program of their own. Samples are the list's, so that it can be placed into it.
 Result<void> World::Impl::compile_mover(Mover& m) {
