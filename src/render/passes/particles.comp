@@ -41,9 +41,11 @@ void main() {
     // One list a level, merged by number, which is the order of distance.
     uint at[kParticleLevels];
     uint last[kParticleLevels];
+    uint first_level[kParticleLevels] = uint[](push.first_0, push.first_1, push.first_2, push.first_3, push.first_4);
+    uint across_level[kParticleLevels] = uint[](push.across_0, push.across_1, push.across_2, push.across_3, push.across_4);
     for (int level = 0; level < kParticleLevels; ++level) {
         uint side = uint(kParticleBin) << uint(2 * level);
-        uint bin = push.first_level[level] + (uint(pixel.y) / side) * push.across[level] + uint(pixel.x) / side;
+        uint bin = first_level[level] + (uint(pixel.y) / side) * across_level[level] + uint(pixel.x) / side;
         at[level] = bin == 0u ? 0u : ends[bin - 1u];
         last[level] = ends[bin];
     }

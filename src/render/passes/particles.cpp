@@ -4,8 +4,6 @@
 #include "shaders/particles.spv.h"
 #include "shaders/particles_light.spv.h"
 
-#include <algorithm>
-
 namespace kiln::render {
 
 namespace {
@@ -23,8 +21,12 @@ void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Fr
     ParticlePush push{};
     push.width = int(in.size.width), push.height = int(in.size.height);
     push.count = p.count;
-    std::copy(p.first_level.begin(), p.first_level.end(), push.first_level);
-    std::copy(p.across.begin(), p.across.end(), push.across);
+    static_assert(kParticleLevels == 5);
+    const auto& first = p.first_level;
+    push.first_0 = first[0], push.first_1 = first[1], push.first_2 = first[2], push.first_3 = first[3];
+    push.first_4 = first[4];
+    push.across_0 = p.across[0], push.across_1 = p.across[1], push.across_2 = p.across[2];
+    push.across_3 = p.across[3], push.across_4 = p.across[4];
     push.behind = in.through.empty() ? 0 : 1;
     push.moves = in.taa ? 1 : 0;
     Buffer light = g.create_buffer("particles light", uint64_t{p.count} * 4 * sizeof(float));

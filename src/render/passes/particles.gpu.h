@@ -26,10 +26,11 @@ struct ParticleRecord {
 struct ParticlePush {
     int width, height;
     uint count;
-    uint first_level[kParticleLevels];  // of a level's bins in the table of ends
-    uint across[kParticleLevels];       // bins in a row
-    uint behind;                        // 1: there is something transparent, that hides particles behind it in part
-    uint moves;                         // 1: what they move is told
+    // A level each, and no arrays: HLSL would give their elements sixteen bytes.
+    uint first_0, first_1, first_2, first_3, first_4;       // of its bins in the table of ends
+    uint across_0, across_1, across_2, across_3, across_4;  // bins in a row
+    uint behind;  // 1: there is something transparent, that hides particles behind it in part
+    uint moves;   // 1: what they move is told
     uint pad_0;
 };
 
