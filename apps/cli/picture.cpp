@@ -78,6 +78,11 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
         return usage("--path has its own cameras and no --reference; leave --camera and --reference out");
     if (o.taa && (o.reference > 0 || s.view != View::Shaded))
         return usage("--taa works on shaded pictures, without --reference; leave it out");
+    if (o.transparent_layers < 0 || o.transparent_layers > 16)
+        return usage("--transparent-layers " + std::to_string(o.transparent_layers) + ": it is 0 to 16");
+    s.transparent_layers = o.transparent_layers;
+    s.outline_hulls = o.outline_hulls;
+    s.cull_meshes = !o.no_cull;
     s.taa = o.taa;
     s.analytic = o.analytic;
     s.unpruned = o.unpruned;
@@ -150,6 +155,17 @@ std::string named_numbers(const std::vector<std::pair<std::string, Number>>& lis
     return "{" + out + "}";
 }
 
+// Of parts in the picture: how many, how many drawn in each phase, and the percentage left out because something hides it.
+std::string clusters_json(const RenderStats& stats) {
+    Json json;
+    const uint64_t drawn = stats.clusters_early + stats.clusters_late;
+    json.number("in_sight", double(stats.clusters))
+        .number("early", double(stats.clusters_early))
+        .number("late", double(stats.clusters_late));
+    json.number("culled_percent", stats.clusters > 0 ? 100 - 100 * double(drawn) / double(stats.clusters) : 0.0);
+    return json.object();
+}
+
 std::string report(const PictureOptions& o, std::string_view quality, const RenderSettings& s, const RenderStats& stats,
                    const Frame& frame, const World& world, double load, double total) {
     Json json;
@@ -180,7 +196,8 @@ std::string report(const PictureOptions& o, std::string_view quality, const Rend
     if (stats.triangles > 0)
         json.number("triangles", double(stats.triangles))
             .number("triangles_drawn", double(stats.triangles_drawn))
-            .number("triangles_culled", double(stats.triangles - stats.triangles_drawn));
+            .number("triangles_culled", double(stats.triangles - std::min(stats.triangles, stats.triangles_drawn)))
+            .raw("mesh_clusters", clusters_json(stats));
     json.text("march_tier", stats.march_tier);
     if (stats.triangles > 0) json.text("mesh_tier", stats.mesh_tier);
     if (stats.boxes > 0)
@@ -265,7 +282,9 @@ int render_sequence(const PictureOptions& o, RenderSettings settings, const Worl
         row.number("frame", i)
             .number("bake_ms", bake_ms)
             .number("frame_ms", stats.frame_ms)
-            .number("bricks", stats.bricks);
+            .number("bricks", stats.bricks)
+            .number("evaluations", double(stats.evaluations));
+        if (stats.clusters > 0) row.raw("mesh_clusters", clusters_json(stats));
         if (!stats.levels.empty()) row.raw("levels", levels_json(stats));
         rows += (rows.empty() ? "" : ", ") + row.object();
     }

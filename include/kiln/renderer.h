@@ -163,6 +163,7 @@ struct RenderSettings {
     int transparent_layers =
         4;  ///< things of glass and panes that a ray may go through, [0, 16]; those behind are not seen
     bool outline_hulls = false;  ///< meshes are outlined by their back faces made larger, for comparison
+    bool cull_meshes = true;     ///< false: triangles that something hides are drawn too, and rays go on behind meshes
 };
 
 /// What a picture may cost. Low: hard shadows, surfaces as the bricks have them. Medium: hard shadows. High: everything that one picture can
@@ -210,6 +211,9 @@ struct RenderStats {
     double instances_ms = 0;             ///< CPU time: their tree and records
     uint64_t triangles = 0;              ///< of meshes, in the scene
     uint64_t triangles_drawn = 0;        ///< given to the rasteriser
+    uint64_t clusters = 0;               ///< of up to 64 of them, of parts in the picture
+    uint64_t clusters_early = 0;         ///< drawn because the picture before showed them
+    uint64_t clusters_late = 0;          ///< drawn because nothing of this picture hides them
     std::string march_tier = "compute";  ///< who marched the bricks: "compute", "rt"
     std::string mesh_tier = "vertex";    ///< who drew meshes, where there are any: "vertex", "mesh"
     uint32_t boxes = 0;                  ///< in the tree that rays are traced through

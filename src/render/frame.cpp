@@ -114,9 +114,10 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
     return out;
 }
 
-TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image words, const Image& refined) {
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image words, const Image& refined,
+                          const Image& mesh_ids) {
     TileResult out;
-    if (in.has_meshes) words = see_meshes(g, in, words, refined);
+    if (in.has_meshes) words = see_meshes(g, in, mesh_ids, words, refined);
     Surface surface = resolve(g, in, words, refined);
     resolve_instances(g, in, words, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
@@ -149,26 +150,54 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
 
 }  // namespace
 
+namespace {
+
+struct Seen {
+    Image words, mesh_ids;
+    std::vector<Readback> evaluations, mesh_numbers;
+};
+
+Seen record_seen(Graph& g, const TileInputs& in) {
+    MeshesEarly early;
+    if (in.cull_meshes) early = draw_early(g, in);
+    const Visibility seen = march(g, in, in.cull_meshes ? &early.drawn.depth : nullptr);
+    Seen out{seen.words, {}, {}, {}};
+    for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
+    if (in.cull_meshes) {
+        const MeshesSeen meshes = draw_late(g, in, early, seen.words);
+        out.mesh_ids = meshes.ids;
+        for (const Buffer& numbers : meshes.numbers) out.mesh_numbers.push_back(g.readback(numbers));
+    }
+    return out;
+}
+
+}  // namespace
+
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
-    const Visibility seen = march(g, in);
+    Seen seen = record_seen(g, in);
     Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
     if (in.refine) refine_instances(g, in, seen.words, refined);
-    TileResult out = record_shading(g, in, wanted, seen.words, refined);
-    for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
+    if (in.has_meshes && !in.cull_meshes) seen.mesh_ids = draw_clusters(g, in).ids;
+    TileResult out = record_shading(g, in, wanted, seen.words, refined, seen.mesh_ids);
+    out.evaluations = std::move(seen.evaluations);
+    out.mesh_numbers = std::move(seen.mesh_numbers);
     return out;
 }
 
 TileSeen record_visibility(Graph& g, const TileInputs& in) {
-    const Visibility seen = march(g, in);
-    TileSeen out{g.readback(seen.words), {}};
-    for (const Buffer& counted : seen.evaluations) out.evaluations.push_back(g.readback(counted));
+    Seen seen = record_seen(g, in);
+    TileSeen out{g.readback(seen.words), {}, std::move(seen.evaluations), std::move(seen.mesh_numbers)};
+    if (in.cull_meshes) out.mesh_ids = g.readback(seen.mesh_ids);
     return out;
 }
 
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<const uint32_t> visibility,
-                       std::span<const uint32_t> refined) {
+                       std::span<const uint32_t> refined, std::span<const uint32_t> mesh_ids) {
     const Image words = image_of_words(g, "visibility", in.size, visibility);
-    return record_shading(g, in, wanted, words, image_of_words(g, "refined", in.size, refined));
+    Image ids;
+    if (in.has_meshes)
+        ids = mesh_ids.empty() ? draw_clusters(g, in).ids : image_of_words(g, "mesh ids", in.size, mesh_ids);
+    return record_shading(g, in, wanted, words, image_of_words(g, "refined", in.size, refined), ids);
 }
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
@@ -179,6 +208,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&resolve_kernel(in));
     instance_kernels(in, view == View::Shaded, out);
     if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
+    if (in.cull_meshes) out.insert(out.end(), {&kDepthPyramid, &kDepthPyramidRest, &kMeshCull, &kMeshPack, &kMeshPick});
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;

@@ -19,17 +19,20 @@ struct TileResult {
     Readback depth;     // a float a pixel
     Readback exposure;  // ExposureState, with `shown`, of a shaded tile
     std::vector<Readback> evaluations;
+    std::vector<Readback> mesh_numbers;  // kMeshDrawnWords of each phase, with TileInputs::cull_meshes
 };
 TileResult record_tile(Graph& g, const TileInputs& in, View view);
 
 // The same in two graphs, where the host refines between them.
 struct TileSeen {
     Readback visibility;  // 4 words a pixel
+    Readback mesh_ids;    // likewise, with TileInputs::cull_meshes
     std::vector<Readback> evaluations;
+    std::vector<Readback> mesh_numbers;
 };
 TileSeen record_visibility(Graph& g, const TileInputs& in);
 TileResult record_tile(Graph& g, const TileInputs& in, View view, std::span<const uint32_t> visibility,
-                       std::span<const uint32_t> refined);
+                       std::span<const uint32_t> refined, std::span<const uint32_t> mesh_ids);
 
 // Kernels of a frame, for warm-up.
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view);

@@ -46,6 +46,32 @@ MeshNode packed(const model::BvhNode& n) {
 
 vec4 row(const Matrix& m, size_t r) { return {float(m[r]), float(m[4 + r]), float(m[8 + r]), float(m[12 + r])}; }
 
+uint32_t clusters_of(const Primitive& p) { return (p.index_count / 3 + kMeshCluster - 1) / kMeshCluster; }
+
+// Boxes of a primitive's clusters. vertex(i): where the corner with that index is.
+template <typename Vertex>
+void add_boxes(std::vector<MeshBox>& to, const Drawable& d, const Primitive& p, Vertex&& vertex) {
+    for (uint32_t first = 0; first < p.index_count; first += 3 * kMeshCluster) {
+        Box3 box;
+        for (uint32_t i = first; i < std::min(first + 3 * kMeshCluster, p.index_count); ++i) {
+            const vec3 at = vertex(d.indices[p.first_index + i]);
+            box = box_union(box, {at, at});
+        }
+        to.push_back({box.min.x, box.min.y, box.min.z, box.max.x, box.max.y, box.max.z});
+    }
+}
+
+std::vector<MeshBox> moved_boxes(const MeshSet& set) {
+    std::vector<MeshBox> out;
+    for (const MeshSet::Part& part : set.parts) {
+        if (part.first_moved == UINT32_MAX) continue;
+        const Primitive& p = set.primitive(part);
+        add_boxes(out, set.drawable(part), p,
+                  [&](uint32_t i) { return set.moved[part.first_moved + i - p.first_vertex].position; });
+    }
+    return out;
+}
+
 // False where all of the box is outside one side of the picture, or behind the eye.
 bool may_be_seen(const Box3& box, dvec3 eye, const shade::CameraParams& camera) {
     const auto dotted = [](const vec4& a, dvec3 b) {
@@ -69,10 +95,15 @@ bool may_be_seen(const Box3& box, dvec3 eye, const shade::CameraParams& camera) 
 
 }  // namespace
 
-GpuMeshes::~GpuMeshes() { let_go(); }
+GpuMeshes::~GpuMeshes() {
+    let_go();
+    if (!seen_) return;
+    runner_->forget(seen_);
+    runner_->device().destroy(seen_);
+}
 
 void GpuMeshes::let_go() {
-    for (rhi::BufferHandle* buffer : {&corners_, &vertices_, &surfaces_, &nodes_}) {
+    for (rhi::BufferHandle* buffer : {&corners_, &vertices_, &surfaces_, &nodes_, &boxes_}) {
         if (!*buffer) continue;
         runner_->forget(*buffer);
         runner_->device().destroy(*buffer);
@@ -173,6 +204,7 @@ Result<void> GpuMeshes::bring_textures(const MeshSet& set, std::vector<MeshSurfa
 Result<void> GpuMeshes::bring(const MeshSet& set) {
     let_go();
     places_.clear();
+    std::vector<MeshBox> boxes;
     std::vector<MeshVertex> vertices;
     std::vector<uint32_t> corners;
     std::vector<MeshNode> nodes(top_nodes_);
@@ -191,6 +223,10 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     for (const auto& d : set.models) {
         places_.push_back(
             {uint32_t(vertices.size()), uint32_t(corners.size()), uint32_t(nodes.size()), uint32_t(surfaces.size())});
+        for (const Primitive& p : d->primitives) {
+            places_.back().first_boxes.push_back(uint32_t(boxes.size()));
+            add_boxes(boxes, *d, p, [&](uint32_t i) { return d->vertices[i].position; });
+        }
         for (const model::Vertex& v : d->vertices) vertices.push_back(packed(v));
         corners.insert(corners.end(), d->indices.begin(), d->indices.end());
         for (const model::BvhNode& n : d->bvh) nodes.push_back(packed(n));
@@ -206,6 +242,9 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     }
     first_moved_vertex_ = uint32_t(vertices.size());
     first_moved_node_ = uint32_t(nodes.size());
+    first_moved_box_ = uint32_t(boxes.size());
+    moved_boxes_ = uint32_t(moved_boxes(set).size());
+    boxes.resize(boxes.size() + moved_boxes_);
     moved_vertices_ = uint32_t(set.moved.size());
     moved_nodes_ = uint32_t(set.moved_nodes.size());
     vertices.resize(vertices.size() + moved_vertices_);
@@ -222,7 +261,32 @@ Result<void> GpuMeshes::bring(const MeshSet& set) {
     if (auto ok = make(corners_, std::as_bytes(std::span(corners)), "mesh corners"); !ok) return ok;
     if (auto ok = make(surfaces_, std::as_bytes(std::span(surfaces)), "mesh surfaces"); !ok) return ok;
     if (auto ok = make(nodes_, std::as_bytes(std::span(nodes)), "mesh boxes"); !ok) return ok;
+    if (auto ok = make(boxes_, std::as_bytes(std::span(boxes)), "mesh cluster boxes"); !ok) return ok;
     models_ = set.models;
+    return {};
+}
+
+// Numbers the clusters of all parts in the frame's order, and makes room to remember of each whether it was seen.
+Result<void> GpuMeshes::count_clusters(const MeshSet& set) {
+    std::vector<uint32_t> firsts(set.parts.size() + 1);  // by number
+    for (const MeshSet::Part& part : set.parts) firsts[part.number + 1] = clusters_of(set.primitive(part));
+    for (size_t i = 1; i < firsts.size(); ++i) firsts[i] += firsts[i - 1];
+    first_clusters_.clear();
+    for (const MeshSet::Part& part : set.parts) first_clusters_.push_back(firsts[part.number]);
+    if (firsts.back() == clusters_of_all_) return {};
+    clusters_of_all_ = 0;
+    if (seen_) {
+        runner_->forget(seen_);
+        runner_->device().destroy(seen_);
+        seen_ = {};
+    }
+    // All count as seen, so that rays end behind meshes in the first picture too.
+    const std::vector<uint32_t> all(std::max(firsts.back(), 1u), 1);
+    auto buffer = runner_->device().create_buffer({.size = all.size() * 4, .label = "mesh clusters seen"});
+    if (!buffer) return buffer.error();
+    seen_ = *buffer;
+    if (auto ok = runner_->device().write_buffer(seen_, 0, std::as_bytes(std::span(all))); !ok) return ok;
+    clusters_of_all_ = firsts.back();
     return {};
 }
 
@@ -232,13 +296,14 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     blends_.clear();
     outlined_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
-    triangles_ = triangles_drawn_ = 0;
+    triangles_ = triangles_in_sight_ = 0;
     holes_ = false;
     if (frame.meshes.empty()) return {};
     const MeshSet set = make_mesh_set(frame);
     if (set.empty()) return {};
-    if (set.models != models_ || set.tree.size() > top_nodes_ || set.moved.size() != moved_vertices_ ||
-        set.moved_nodes.size() != moved_nodes_) {
+    const std::vector<MeshBox> boxes_now = moved_boxes(set);
+    if (set.models != models_ || boxes_now.size() != moved_boxes_ || set.tree.size() > top_nodes_ ||
+        set.moved.size() != moved_vertices_ || set.moved_nodes.size() != moved_nodes_) {
         top_nodes_ = std::bit_ceil(uint32_t(set.tree.size()));
         if (auto ok = bring(set); !ok) {
             let_go();
@@ -257,6 +322,13 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         top.push_back(out);
     }
     rhi::Device& device = runner_->device();
+    if (auto ok = count_clusters(set); !ok) return ok;
+    if (!boxes_now.empty()) {
+        if (auto ok = device.write_buffer(boxes_, uint64_t{first_moved_box_} * sizeof(MeshBox),
+                                          std::as_bytes(std::span(boxes_now)));
+            !ok)
+            return ok;
+    }
     if (auto ok = device.write_buffer(nodes_, 0, std::as_bytes(std::span(top))); !ok) return ok;
     if (moved_vertices_ > 0) {
         std::vector<MeshVertex> vertices;
@@ -279,6 +351,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         outline_of[i] = uint32_t(outlined_.size());
     }
     std::vector<Box3> boxes(outlined_.size());
+    uint32_t next_moved_box = first_moved_box_;
     for (const MeshSet::Part& part : set.parts) {
         const Primitive& p = set.primitive(part);
         if (const uint32_t n = outline_of[part.mesh]; n > 0) boxes[n - 1] = box_union(boxes[n - 1], part.bounds);
@@ -297,7 +370,9 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
                           (surface.double_sided ? kMeshDoubleSided : 0u) | (holes ? kMeshMask : 0u) |
                               (surface.blend ? kMeshBlend : 0u) | (p.closed && !moved && !holes ? kMeshClosed : 0u) |
                               (model::determinant(place) < 0 ? kMeshMirrored : 0u),
-                          p.index_count / 3, outline_of[part.mesh]});
+                          p.index_count / 3, outline_of[part.mesh], first_clusters_[parts_.size()],
+                          moved ? next_moved_box : at.first_boxes[part.primitive], 0, 0});
+        if (moved) next_moved_box += clusters_of(p);
         holes_ = holes_ || holes;
         if (surface.blend) {
             const auto from_eye = [&](vec3 v) {
@@ -310,7 +385,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     std::vector<bool> in_sight;
     for (const MeshSet::Part& part : set.parts) in_sight.push_back(may_be_seen(part.bounds, eye, camera));
     for (size_t i = 0; i < parts_.size(); ++i)
-        if (in_sight[i]) triangles_drawn_ += parts_[i].triangle_count;
+        if (in_sight[i]) triangles_in_sight_ += parts_[i].triangle_count;
     const auto list = [&](uint32_t& count, bool holes, bool both) {
         for (uint32_t i = 0; i < parts_.size(); ++i) {
             if (!in_sight[i] || (parts_[i].flags & kMeshBlend) != 0) continue;  // what blends: mesh_trace.comp
@@ -354,6 +429,8 @@ MeshHandles GpuMeshes::import(Graph& g) const {
     out.double_sided = double_sided_;
     out.masked = masked_;
     out.outlined = outlined_;
+    out.boxes = g.import("mesh cluster boxes", boxes_);
+    out.seen = g.import("mesh clusters seen", seen_);
     return out;
 }
 

@@ -6,6 +6,7 @@
 #include "render/graph_runner.h"
 #include "render/lib/camera.gpu.h"
 #include "render/mesh_set.h"
+#include "render/passes/mesh_cull.gpu.h"
 
 #include <array>
 #include <string>
@@ -29,6 +30,9 @@ struct MeshHandles {
     std::array<Image, 2 * kMeshPages> pages;
     uint32_t one_sided = 0, double_sided = 0, masked = 0;  // clusters
     std::vector<MeshOutline> outlined;                     // their clusters follow those
+    Buffer boxes;                                          // MeshBox: of each cluster
+    Buffer seen;  // a word for each cluster of all parts: whether the last picture showed it; stays
+    uint32_t listed() const { return one_sided + double_sided + masked; }
 };
 
 class GpuMeshes {
@@ -48,15 +52,19 @@ public:
     const std::vector<Box3>& blends() const { return blends_; }
     const std::vector<MeshOutline>& outlined() const { return outlined_; }
     uint64_t triangles() const { return triangles_; }
-    uint64_t triangles_drawn() const { return triangles_drawn_; }
+    // Of parts in sight: what is drawn where nothing hidden is left out.
+    uint64_t triangles_in_sight() const { return triangles_in_sight_; }
+    uint32_t clusters_in_sight() const { return one_sided_ + double_sided_ + masked_; }
 
 private:
     struct Model {
         uint32_t first_vertex = 0, first_corner = 0, first_node = 0, first_surface = 0;
+        std::vector<uint32_t> first_boxes = {};  // by primitive
     };
     Result<void> bring(const MeshSet& set);
     Result<void> bring_textures(const MeshSet& set, std::vector<MeshSurface>& surfaces);
     Result<void> bring_page(size_t page, rhi::Extent size, const std::vector<std::vector<uint8_t>>& layers);
+    Result<void> count_clusters(const MeshSet& set);
     void let_go();
 
     Runner* runner_;
@@ -64,7 +72,10 @@ private:
     std::vector<Model> places_;  // by model
     uint32_t top_nodes_ = 0;     // room for the parts' tree
     uint32_t moved_vertices_ = 0, moved_nodes_ = 0, first_moved_vertex_ = 0, first_moved_node_ = 0;
-    rhi::BufferHandle corners_, vertices_, surfaces_, nodes_;
+    uint32_t moved_boxes_ = 0, first_moved_box_ = 0;
+    std::vector<uint32_t> first_clusters_;  // by part
+    uint32_t clusters_of_all_ = 0;
+    rhi::BufferHandle corners_, vertices_, surfaces_, nodes_, boxes_, seen_;
     std::array<rhi::TextureHandle, 2 * kMeshPages> pages_;
     std::vector<MeshPart> parts_;
     std::vector<MeshClusterRef> clusters_;
@@ -72,7 +83,7 @@ private:
     bool holes_ = false;
     std::vector<Box3> blends_;
     std::vector<MeshOutline> outlined_;
-    uint64_t triangles_ = 0, triangles_drawn_ = 0;
+    uint64_t triangles_ = 0, triangles_in_sight_ = 0;
 };
 
 }  // namespace kiln::render

@@ -124,6 +124,7 @@ MeshSet make_mesh_set(const Frame& frame) {
                 const double size = model::determinant(part.place);
                 // Flattened to nothing: a scale of 0 hides a node.
                 if (!(std::fabs(size) > 1e-30) || !part.bounds.finite()) continue;
+                part.number = uint32_t(parts.size());
                 parts.push_back(part);
             }
         }

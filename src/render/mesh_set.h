@@ -18,6 +18,7 @@ struct MeshSet {
         uint32_t model = 0;               // of `models`
         uint32_t primitive = 0;           // of that model
         uint32_t mesh = 0;                // of Frame::meshes
+        uint32_t number = 0;              // in the frame's own order, which nothing that moves changes
         model::Matrix place{}, before{};  // world from local
         Box3 bounds;                      // world, grown by rounding
         // Of a skinned part: its vertices are `moved` from here on, in world metres, and its boxes `nodes`.

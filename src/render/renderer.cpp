@@ -19,6 +19,7 @@
 #include "render/passes/forward.h"
 #include "render/particle_bins.h"
 #include "render/passes/instances.h"
+#include "render/passes/refine.gpu.h"
 #include "render/picture.h"
 #include "render/through_rects.h"
 #include "render/temporal.h"
@@ -133,6 +134,7 @@ struct Renderer::Impl {
         in.has_meshes = !meshes->empty();
         in.rt = traces(frame, settings) && boxes->boxes() > 0;
         in.mesh_shader = settings.tier == Tier::Mesh;
+        in.cull_meshes = culls_meshes(settings);
         in.moved.owners.count = uint32_t(moved.records.size());
         in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
         in.moved.has_boxes = !moved.boxes.empty();
@@ -150,6 +152,9 @@ struct Renderer::Impl {
         in.outline_hulls = outlines && settings.outline_hulls;
         in.has_lines = !lines.empty() && settings.view == View::Shaded && in.develops;
         return in;
+    }
+    bool culls_meshes(const RenderSettings& settings) const {
+        return settings.cull_meshes && settings.accelerate && meshes->clusters_in_sight() > 0;
     }
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
     static bool traces(const Frame& frame, const RenderSettings& settings) {
@@ -233,6 +238,7 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
         FrameParams part = params;
         part.tile_x = rect.x, part.tile_y = rect.y;
         part.tile_width = rect.width, part.tile_height = rect.height;
+        part.flags &= ~kFrameRayEnds;
         if (!in.refine) part.flags &= ~kFrameRefine;
         ThroughPart& out = in.through.emplace_back();
         out.x = rect.x - tile.x, out.y = rect.y - tile.y;
@@ -353,9 +359,17 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         }
         return in;
     };
-    const auto run = [&](Graph& g, std::span<const Readback> evaluations) -> Result<void> {
+    const auto run = [&](Graph& g, std::span<const Readback> evaluations,
+                         std::span<const Readback> mesh_numbers) -> Result<void> {
         auto submit = runner->execute(g);
         if (!submit) return submit.error();
+        for (size_t phase = 0; phase < mesh_numbers.size(); ++phase) {
+            auto words = mesh_numbers[phase].get_as<uint32_t>();
+            if (!words) return words.error();
+            uint64_t& clusters = phase == 0 ? stats.clusters_early : stats.clusters_late;
+            for (size_t kind = 0; kind < 3; ++kind) clusters += (*words)[kMeshDrawWords * kind + 1];
+            stats.triangles_drawn += (*words)[kMeshDrawnTriangles];
+        }
         for (const Readback& counted : evaluations) {
             auto words = counted.get_as<uint32_t>();
             if (!words) return words.error();
@@ -379,12 +393,17 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         return {};
     };
 
-    std::vector<uint32_t> visibility, refined;
+    std::vector<uint32_t> visibility, refined, mesh_ids;
     const bool on_host = refines_on_host() && (params.flags & kFrameRefine) != 0;
     if (on_host) {
         Graph first(*runner);
         const TileSeen seen = record_visibility(first, inputs_on(first));
-        if (auto done = run(first, seen.evaluations); !done) return done;
+        if (auto done = run(first, seen.evaluations, seen.mesh_numbers); !done) return done;
+        if (culls_meshes(settings)) {
+            auto ids = seen.mesh_ids.get_as<uint32_t>();
+            if (!ids) return ids.error();
+            mesh_ids = std::move(*ids);
+        }
         auto words = seen.visibility.get_as<uint32_t>();
         if (!words) return words.error();
         visibility = std::move(*words);
@@ -397,8 +416,8 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     Graph g(*runner);
     const TileInputs in = inputs_on(g);
     const TileResult tile =
-        on_host ? record_tile(g, in, settings.view, visibility, refined) : record_tile(g, in, settings.view);
-    if (auto done = run(g, tile.evaluations); !done) return done;
+        on_host ? record_tile(g, in, settings.view, visibility, refined, mesh_ids) : record_tile(g, in, settings.view);
+    if (auto done = run(g, tile.evaluations, tile.mesh_numbers); !done) return done;
     auto radiance = tile.radiance.get();
     if (!radiance) return radiance.error();
     std::vector<std::byte> shown;
@@ -508,6 +527,12 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         !warm)
         return warm.error();
     params->sky = shade::sky_params(frame);
+    if (switches.cull_meshes) params->flags |= kFrameRayEnds;
+    if ((params->flags & kFrameRefine) != 0) {
+        float voxels = levels ? float(1u << (frame.levels->level_count() - 1)) : 1.0f;
+        for (const InstanceRecord& i : instances->records()) voxels = std::max(voxels, 1 / i.voxels);
+        params->refine_reach = kRefineMostVoxels * voxels;
+    }
     const bool taa = settings.taa && settings.view == View::Shaded;
     if (taa && tiles_of(settings, frame.lights.size()) > 1)
         return Error{
@@ -583,7 +608,11 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         stats.box_tree_bytes = boxes->bytes();
     }
     stats.triangles = meshes->triangles();
-    stats.triangles_drawn = meshes->triangles_drawn();
+    stats.clusters = meshes->clusters_in_sight();
+    if (!switches.cull_meshes) {
+        stats.triangles_drawn = meshes->triangles_in_sight();
+        stats.clusters_late = stats.clusters;
+    }
     if (runner->pipelines().made_late() != late)
         log::warn("{} pipelines were made during a frame", runner->pipelines().made_late() - late);
     if (auto ok = healthy(); !ok) return ok.error();

@@ -36,7 +36,8 @@ struct FrameParams {
     SkyParams sky;
     uint view;  // kiln::View
     uint material_count;
-    uint pad_0, pad_1;
+    float refine_reach;  // how far refining may move what march found, finest voxels, on the coarsest level or instance
+    uint pad_0;
 };
 
 KILN_CONST uint kFrameAccelerate = 1u;       // jump over empty cells
@@ -45,6 +46,7 @@ KILN_CONST uint kFrameAnalytic = 4u;         // march the pruned programs of the
 KILN_CONST uint kFrameUnpruned = 8u;         // march the whole program
 KILN_CONST uint kFrameOutsideConcave = 16u;  // half-spaces alone leave the grid: their field is concave along a ray
 KILN_CONST uint kFrameAllLights = 64u;       // every light at every pixel: the slow twin of the lists
+KILN_CONST uint kFrameRayEnds = 128u;        // march's rays end behind the meshes that are drawn already
 KILN_CONST uint kFrameRefine = 32u;          // points of bricks are moved to where their code has the surface
 
 // A ray given from outside (tests, queries): origin in voxels, unit direction.

@@ -20,7 +20,7 @@ const Kernel& march_kernel(const TileInputs& in) {
     return in.has_instances ? kMarchInstances : kMarch;
 }
 
-Visibility march(Graph& g, const TileInputs& in) {
+Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth) {
     Visibility out;
     const uint32_t groups =
         ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
@@ -32,8 +32,15 @@ Visibility march(Graph& g, const TileInputs& in) {
         out.evaluations.push_back(march_boxes(g, in, words));
     } else {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
-        std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays), g.read(f.distances),
-                              g.write(words),      g.read(f.tables), g.write(counted)};
+        Image ends;
+        if (mesh_depth != nullptr) {
+            ends = *mesh_depth;
+        } else {
+            ends = g.create("no mesh depth", {.size = {1, 1}, .format = rhi::Format::R32Float});
+            g.clear(ends);
+        }
+        std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays),  g.read(f.distances),
+                              g.write(words),      g.read(f.tables), g.write(counted), g.read(ends)};
         if (in.levels) uses.push_back(g.uniform(in.levels_block));
         if (in.has_instances) {
             const InstanceHandles& i = in.instances;

@@ -3,6 +3,7 @@
 // with KILN_INSTANCES, of instances too.
 
 #include "field/levels.gpu.h"
+#include "render/passes/mesh.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
@@ -14,11 +15,13 @@ layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D visibility;
 layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 6, std430) writeonly buffer Counters { uint evaluations[]; };  // one a workgroup
 
+layout(set = 0, binding = 7) uniform texture2D mesh_depth;  // not read without kFrameRayEnds
+
 #ifdef KILN_LEVELS
-layout(set = 0, binding = 7, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
-#define KILN_NEXT_BINDING 8
+layout(set = 0, binding = 8, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
+#define KILN_NEXT_BINDING 9
 #else
-#define KILN_NEXT_BINDING 7
+#define KILN_NEXT_BINDING 8
 #endif
 
 #ifdef KILN_INSTANCES
@@ -44,6 +47,15 @@ LevelHit world_march(TexelRay ray, float t_min, float t_max, bool accelerate) {
 #include "render/passes/march_sets.glsl"
 #endif
 
+// Where a ray has passed the triangle that the rasteriser found, by as much as refining may move a hit: what is behind is not seen. Voxels.
+float ray_end(ivec2 pixel, vec3 direction) {
+    if ((frame.flags & kFrameRayEnds) == 0u) return kFarVoxels;
+    float depth = texelFetch(mesh_depth, pixel, 0).x;
+    if (depth <= 0.0) return kFarVoxels;
+    float t = kMeshNear / (depth * dot(direction, frame.camera.forward.xyz) * frame.grid.voxel_size);
+    return min(t * 1.002 + frame.refine_reach, kFarVoxels);
+}
+
 shared uint group_evaluations;
 
 void main() {
@@ -53,6 +65,7 @@ void main() {
     if (pixel.x < frame.tile_width && pixel.y < frame.tile_height) {
         TexelRay ray = pixel_ray(pixel);
         bool accelerate = (frame.flags & kFrameAccelerate) != 0u;
+        float t_last = ray_end(pixel, ray.direction);
 #ifdef KILN_INSTANCES
         // The world up to the first box of an instance; the instances; the world behind that box, up to what was found there. So neither
         // looks at voxels that the other hides.
@@ -65,13 +78,13 @@ void main() {
         int cells = boxes;
         int voxels = 0;
         float t_begin = 0.0;
-        float t_end = first_box;
+        float t_end = min(first_box, t_last);
         for (int part = 0; part < 2; ++part) {
             found = world_march(ray, t_begin, t_end, accelerate);
             cells += found.hit.cells;
             voxels += found.hit.voxels;
-            if (part == 1 || first_box >= kFarVoxels || found.hit.state == kMarchHit || found.hit.state == kMarchInside) break;
-            beside = march_sets(ray, from, inverse, accelerate);
+            if (part == 1 || first_box >= t_last || found.hit.state == kMarchHit || found.hit.state == kMarchInside) break;
+            beside = march_sets(ray, from, inverse, t_last, accelerate);
             cells += beside.cells;
             voxels += beside.voxels;
             t_begin = first_box;
@@ -83,12 +96,13 @@ void main() {
         hit.voxels = voxels;
         bool is_set = beside.instance != kNoInstance && !((hit.state == kMarchHit || hit.state == kMarchInside) && hit.t <= beside.t);
 #else
-        LevelHit found = world_march(ray, 0.0, kFarVoxels, accelerate);
+        LevelHit found = world_march(ray, 0.0, t_last, accelerate);
         MarchHit hit = found.hit;
         const bool is_set = false;
 #endif
         uint level = uint(max(found.level, 0));
-        uvec4 seen = uvec4(floatBitsToUint(kFarVoxels), kSeenNothing << 28u, 0u, 0u);
+        // Where nothing was found, whoever marches on ends there too.
+        uvec4 seen = uvec4(floatBitsToUint(t_last), kSeenNothing << 28u, 0u, 0u);
         if (!is_set && hit.state != kMarchMiss) {
             uint state = hit.state == kMarchHit ? kSeenBrick : kSeenInside;
             seen.x = floatBitsToUint(hit.t);

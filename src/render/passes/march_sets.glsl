@@ -54,9 +54,9 @@ float first_box_of(vec3 from, vec3 inverse, inout int looks) {
     return first;
 }
 
-// The nearest hit of all; of equals the lower number.
-SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, bool accelerate) {
-    SetHit nearest = SetHit(kFarVoxels, kNoInstance, no_hit(), 0, 0);
+// The nearest hit of all up to t_last; of equals the lower number.
+SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, float t_last, bool accelerate) {
+    SetHit nearest = SetHit(t_last, kNoInstance, no_hit(), 0, 0);
     uint at = 0u;
     while (at < push.node_count) {
         // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray

@@ -32,7 +32,10 @@ struct MeshPart {
     uint node_count;
     uint flags;  // kMesh…
     uint triangle_count;
-    uint outline;  // number of its mesh among the outlined ones, plus one; 0: it is not outlined
+    uint outline;        // number of its mesh among the outlined ones, plus one; 0: it is not outlined
+    uint first_cluster;  // number of its first cluster among all of the frame, the same while the same meshes are drawn
+    uint first_box;      // of its clusters
+    uint pad_0, pad_1;
 };
 KILN_CONST uint kMeshDoubleSided = 1u;
 KILN_CONST uint kMeshMask = 2u;    // holes where alpha is less than the cutoff
@@ -84,11 +87,13 @@ KILN_CONST float kMeshNear = 1e-4f;
 struct MeshDrawPush {
     uint first;  // of the cluster list
     uint count;
-    uint pad_1, pad_2;
+    uint
+        drawn;  // 0: all of them; else a mesh shader finds how many in this word, less one, of the numbers that mesh_pack.comp wrote
+    uint pad_0;
 };
 
 #ifdef __cplusplus
-static_assert(sizeof(MeshVertex) == 44 && sizeof(MeshPart) == 176 && sizeof(MeshNode) == 32 &&
+static_assert(sizeof(MeshVertex) == 44 && sizeof(MeshPart) == 192 && sizeof(MeshNode) == 32 &&
               sizeof(MeshSurface) == 192);
 }  // namespace kiln::render
 #endif

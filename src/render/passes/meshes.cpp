@@ -67,33 +67,51 @@ const RasterKernel kMeshMaskedGroups{.name = "meshes by groups with holes",
                                      .mesh = kMeshGroupsMeshSpv};
 const Kernel& mesh_shadow_kernel(const TileInputs& in) { return in.mesh_holes ? kMeshShadowHoles : kMeshShadow; }
 
-Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
+MeshIds draw_clusters(Graph& g, const TileInputs& in, const Buffer* clusters, const Buffer* numbers) {
     const MeshHandles& m = in.meshes;
-    Image ids = g.create("mesh ids", {.size = in.size, .format = rhi::Format::Rg32Uint});
-    Image depth = g.create("mesh depth", {.size = in.size, .format = rhi::Format::Depth32Float});
+    const Buffer& list = clusters != nullptr ? *clusters : m.clusters;
+    MeshIds out;
+    out.ids = g.create("mesh ids", {.size = in.size, .format = rhi::Format::Rg32Uint});
+    out.depth = g.create("mesh depth", {.size = in.size, .format = rhi::Format::Depth32Float});
     rhi::Load load = rhi::Load::Clear;
-    const auto draw = [&](const RasterKernel& by_vertices, const RasterKernel& by_groups, uint32_t first,
-                          uint32_t count, bool holes) {
+    uint32_t first = 0, kind = 0;
+    const auto draw = [&](const RasterKernel& by_vertices, const RasterKernel& by_groups, uint32_t count, bool holes) {
+        const MeshDrawPush push{
+            .first = first, .count = count, .drawn = numbers != nullptr ? kMeshDrawWords * kind + 2 : 0, .pad_0 = 0};
+        const uint64_t at = uint64_t{4} * kMeshDrawWords * kind;
+        first += count;
+        ++kind;
         if (count == 0) return;
-        const RasterKernel& kernel = in.mesh_shader ? by_groups : by_vertices;
-        const DrawCall call = in.mesh_shader ? DrawCall{.vertices = std::min(count, kGroupsInRow),
-                                                        .instances = (count + kGroupsInRow - 1) / kGroupsInRow}
-                                             : DrawCall{.vertices = 3 * kMeshCluster, .instances = count};
-        std::vector<Use> uses{g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners),
+        DrawCall call{.vertices = 3 * kMeshCluster, .instances = count};
+        if (in.mesh_shader) {
+            call.vertices = std::min(count, kGroupsInRow);
+            call.instances = (count + kGroupsInRow - 1) / kGroupsInRow;
+        } else if (numbers != nullptr) {
+            call.indirect_buffer = *numbers;
+            call.indirect_offset = at;
+        }
+        std::vector<Use> uses{g.uniform(in.frame), g.read(list), g.read(m.parts), g.read(m.corners),
                               g.read(m.vertices)};
         if (holes) {
             uses.push_back(g.read(m.surfaces));
             for (const Image& page : m.pages) uses.push_back(g.read(page));
             uses.push_back(g.sampler(kTrilinear));
         }
-        g.draw(kernel, {.colors = {{.image = &ids, .load = load}}, .depth = {.image = &depth, .load = load}}, uses,
-               MeshDrawPush{.first = first, .count = count, .pad_1 = 0, .pad_2 = 0}, {&call, 1});
+        if (in.mesh_shader) uses.push_back(g.read(numbers != nullptr ? *numbers : in.rays));
+        g.draw(in.mesh_shader ? by_groups : by_vertices,
+               {.colors = {{.image = &out.ids, .load = load}}, .depth = {.image = &out.depth, .load = load}}, uses,
+               push, {&call, 1});
         load = rhi::Load::Load;
     };
-    draw(kMeshOneSided, kMeshOneSidedGroups, 0, m.one_sided, false);
-    draw(kMeshDoubleSidedDraw, kMeshDoubleSidedGroups, m.one_sided, m.double_sided, false);
-    draw(kMeshMasked, kMeshMaskedGroups, m.one_sided + m.double_sided, m.masked, true);
-    if (load == rhi::Load::Clear) g.clear(ids);  // nothing is in sight
+    draw(kMeshOneSided, kMeshOneSidedGroups, m.one_sided, false);
+    draw(kMeshDoubleSidedDraw, kMeshDoubleSidedGroups, m.double_sided, false);
+    draw(kMeshMasked, kMeshMaskedGroups, m.masked, true);
+    if (load == rhi::Load::Clear) g.clear(out.ids);  // nothing is in sight
+    return out;
+}
+
+Image see_meshes(Graph& g, const TileInputs& in, const Image& ids, const Image& visibility, const Image& refined) {
+    const MeshHandles& m = in.meshes;
     Image out = g.create("visibility with meshes", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kMeshSee, in.size,
                {g.uniform(in.frame), g.read(in.rays), g.read(m.parts), g.read(m.corners), g.read(m.vertices),

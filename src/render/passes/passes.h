@@ -28,6 +28,7 @@ extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances
     kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kLightGlass, kLightGlassImage, kTonemap,
     kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
+extern const Kernel kDepthPyramid, kDepthPyramidRest, kMeshCull, kMeshPack, kMeshPick;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow, kMeshShadowHoles;
 extern const RasterKernel kMeshOneSided, kMeshDoubleSidedDraw, kMeshMasked;
 extern const RasterKernel kMeshOneSidedGroups, kMeshDoubleSidedGroups, kMeshMaskedGroups;  // by a mesh shader
@@ -126,6 +127,7 @@ struct TileInputs {
     BoxHandles boxes;          // with `rt`
     bool rt = false;           // the bricks are marched by rays through their boxes
     bool mesh_shader = false;  // clusters of meshes are drawn by a mesh shader
+    bool cull_meshes = false;  // those that something hides are not: see mesh_cull.cpp
     MovedHandles moved;        // with taa
     bool mesh_holes = false;
     bool has_lines = false;
@@ -147,8 +149,8 @@ struct Visibility {
     std::vector<Buffer> evaluations;
 };
 const Kernel& march_kernel(const TileInputs& in);
-// First hits on the field and on instances.
-Visibility march(Graph& g, const TileInputs& in);
+// First hits on the field and on instances. With `mesh_depth` (and kFrameRayEnds) rays end where they have passed what it shows.
+Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth = nullptr);
 // The words of the bricks, by rays through in.boxes; what it answers counts evaluations.
 Buffer march_boxes(Graph& g, const TileInputs& in, Image& words);
 
@@ -166,8 +168,30 @@ Image refine(Graph& g, const TileInputs& in, const Image& visibility);
 std::vector<uint32_t> refine_on_host(const BrickCode& bricks, const FrameParams& frame,
                                      std::span<const uint32_t> visibility);
 
+// Triangles as the rasteriser leaves them: number in their part plus one (0: none), part; reversed depth.
+struct MeshIds {
+    Image ids, depth;
+};
+// Clusters of the list, or of `clusters`, of whose kinds `numbers` (of mesh_pack.comp) tells how many there are.
+MeshIds draw_clusters(Graph& g, const TileInputs& in, const Buffer* clusters = nullptr,
+                      const Buffer* numbers = nullptr);
+// Draws in two phases, each chosen on the device: what the picture before showed, and, once the field is marched, what of the rest
+// `visibility` and the first phase do not hide.
+struct MeshesEarly {
+    MeshIds drawn;
+    Buffer chosen, numbers, seen;
+};
+struct MeshesSeen {
+    Image ids;
+    std::vector<Buffer> numbers;  // of each phase: kMeshDrawnWords
+};
+MeshesEarly draw_early(Graph& g, const TileInputs& in);
+MeshesSeen draw_late(Graph& g, const TileInputs& in, const MeshesEarly& early, const Image& visibility);
+// Levels of a pyramid of what a tile shows; see depth_pyramid.gpu.h.
+Buffer depth_pyramid(Graph& g, const TileInputs& in, const Image& mesh_depth, const Image& visibility);
+
 // Visibility words where meshes that are nearer than the field are seen.
-Image see_meshes(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+Image see_meshes(Graph& g, const TileInputs& in, const Image& ids, const Image& visibility, const Image& refined);
 // Fills in the surface where meshes are seen.
 void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
 // The fractions, less what meshes hide.

@@ -16,6 +16,7 @@ KILN_CONST int kRefineSteps = 16;
 // What may be left of the distance there; and how far a place may move before it is another surface's.
 KILN_CONST float kRefinedVoxels = 0.01f;
 KILN_CONST float kRefineReachVoxels = 6.0f;
+KILN_CONST float kRefineMostVoxels = 6.1f;  // … rounding included
 // Word of a point that stays where it is.
 KILN_CONST uint kNotRefined = 0xffffffffu;
 
