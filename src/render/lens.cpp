@@ -47,11 +47,8 @@ void fill(Light& out, int workers, Texel&& texel) {
     });
 }
 
-// Where the middle of a texel of `to` is in texels of `from`.
-vec2 middle(const Light& from, const Light& to, int x, int y) {
-    return {(float(x) + 0.5f) * float(from.width) / float(to.width),
-            (float(y) + 0.5f) * float(from.height) / float(to.height)};
-}
+// Where the middle of a texel is in texels that are `finer` times as many along a side.
+vec2 middle(int x, int y, float finer) { return {(float(x) + 0.5f) * finer, (float(y) + 0.5f) * finer}; }
 
 // The glow at full size.
 Light pyramid(const Light& picture, float size, int workers) {
@@ -61,19 +58,18 @@ Light pyramid(const Light& picture, float size, int workers) {
         Light out(level.width, level.height);
         const Light& from = levels.empty() ? picture : levels.back();
         Filter filter{from};
-        fill(out, workers, [&](int x, int y) { return filter.bloom_down(middle(from, out, x, y)); });
+        fill(out, workers, [&](int x, int y) { return filter.bloom_down(middle(x, y, 2)); });
         levels.push_back(std::move(out));
     }
     for (size_t i = levels.size() - 1; i-- > 0;) {
         Filter filter{levels[i + 1]};
         const Light here = levels[i];
-        fill(levels[i], workers, [&](int x, int y) {
-            return mix(here.at(x, y), filter.bloom_up(middle(filter.from, here, x, y)), plan[i].coarser);
-        });
+        fill(levels[i], workers,
+             [&](int x, int y) { return mix(here.at(x, y), filter.bloom_up(middle(x, y, 0.5f)), plan[i].coarser); });
     }
     Light out(picture.width, picture.height);
     Filter filter{levels.front()};
-    fill(out, workers, [&](int x, int y) { return filter.bloom_up(middle(filter.from, out, x, y)); });
+    fill(out, workers, [&](int x, int y) { return filter.bloom_up(middle(x, y, 0.5f)); });
     return out;
 }
 
@@ -104,8 +100,9 @@ std::vector<BloomLevel> bloom_levels(int width, int height, float size) {
     const float widest = std::log2(std::max(size * float(height), 2.0f));
     std::vector<BloomLevel> out;
     // Below the widest octave all of one, above it what is left of one.
-    for (int i = 1; i == 1 || (float(i) - widest < 1 && (width >> i) > 1 && (height >> i) > 1); ++i)
-        out.push_back({std::max(width >> i, 1), std::max(height >> i, 1), 0});
+    const auto half_sized = [](int pixels, int i) { return (pixels + (1 << i) - 1) >> i; };
+    for (int i = 1; i == 1 || (float(i) - widest < 1 && half_sized(width, i) > 1 && half_sized(height, i) > 1); ++i)
+        out.push_back({half_sized(width, i), half_sized(height, i), 0});
     float below = 0;
     for (size_t i = out.size(); i-- > 0;) {
         const float octave = float(i + 1) - widest;

@@ -17,6 +17,8 @@ struct BloomLevel {
     int width = 0, height = 0;
     float coarser = 0;
 };
+// Each level is half as large as the one before, rounded up: a texel is always two by two of the finer ones (beyond an odd edge, of its
+// continuation). A scale that were a little off 2 would drift across the filter's taps, which then count some texels twice and others never.
 // Octaves of a glow whose widest is `size` of the picture's height: each finer one has three quarters of the next coarser one's light, and
 // the finest all that would be finer still. So the glow is as large, seen from the eye, at any resolution.
 std::vector<BloomLevel> bloom_levels(int width, int height, float size);

@@ -26,8 +26,8 @@ struct PyramidGpu : GpuTest {
         const auto groups = [](int w, int h) { return Groups{uint32_t(w + 63) / 64, uint32_t(h + 63) / 64, 1}; };
         g.dispatch(kPyramidOfHash, groups(width, height), {g.write(out)}, push);
         for (push.from = kPyramidAtOnce; push.from < push.levels; push.from += kPyramidAtOnce)
-            g.dispatch(kDepthPyramidRest,
-                       groups(pyramid_side(width, push.from), pyramid_side(height, push.from)), {g.read_write(out)}, push);
+            g.dispatch(kDepthPyramidRest, groups(pyramid_side(width, push.from), pyramid_side(height, push.from)),
+                       {g.read_write(out)}, push);
         return g.readback(out);
     }
     static void check(const std::vector<float>& pyramid, int width, int height) {
@@ -40,8 +40,8 @@ struct PyramidGpu : GpuTest {
                     for (int v = y; v < std::min(y + side, height); ++v)
                         for (int u = x; u < std::min(x + side, width); ++u) least = std::min(least, source(u, v));
                     ASSERT_LT(at, pyramid.size());
-                    ASSERT_EQ(pyramid[at], least) << width << " x " << height << ", level " << level << " at " << x
-                                                  << ", " << y;
+                    ASSERT_EQ(pyramid[at], least)
+                        << width << " x " << height << ", level " << level << " at " << x << ", " << y;
                 }
             }
         }

@@ -19,6 +19,5 @@ vec3 bloom_sample(vec2 at) { return textureLod(sampler2D(finer, linear), at / ve
 void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (texel.x >= push.width || texel.y >= push.height) return;
-    vec2 at = (vec2(texel) + 0.5) * vec2(textureSize(finer, 0)) / vec2(push.width, push.height);
-    imageStore(target, texel, vec4(bloom_down(at), 1.0));
+    imageStore(target, texel, vec4(bloom_down(2.0 * (vec2(texel) + 0.5)), 1.0));
 }

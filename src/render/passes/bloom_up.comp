@@ -20,6 +20,6 @@ vec3 bloom_sample(vec2 at) { return textureLod(sampler2D(coarser, linear), at / 
 void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (texel.x >= push.width || texel.y >= push.height) return;
-    vec2 at = (vec2(texel) + 0.5) * vec2(textureSize(coarser, 0)) / vec2(push.width, push.height);
-    imageStore(target, texel, vec4(mix(texelFetch(level, texel, 0).rgb, bloom_up(at), push.coarser), 1.0));
+    vec3 wider = bloom_up(0.5 * (vec2(texel) + 0.5));
+    imageStore(target, texel, vec4(mix(texelFetch(level, texel, 0).rgb, wider, push.coarser), 1.0));
 }

@@ -11,8 +11,8 @@
 namespace kiln::render {
 #endif
 
-KILN_CONST int kPyramidTile = 64;     // pixels along a side of what a workgroup reduces to one value
-KILN_CONST int kPyramidAtOnce = 6;    // levels that it writes on the way
+KILN_CONST int kPyramidTile = 64;       // pixels along a side of what a workgroup reduces to one value
+KILN_CONST int kPyramidAtOnce = 6;      // levels that it writes on the way
 KILN_CONST float kPyramidNone = 3e38f;  // nearer than anything: of no pixel
 
 KILN_FN int pyramid_side(int pixels, int level) { return (pixels + (1 << level) - 1) >> level; }

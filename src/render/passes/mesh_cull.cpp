@@ -61,7 +61,8 @@ Chosen choose(Graph& g, const TileInputs& in, Buffer& seen, const Buffer* pyrami
 Buffer depth_pyramid(Graph& g, const TileInputs& in, const Image& mesh_depth, const Image& visibility) {
     DepthPyramidPush push{.width = int(in.size.width), .height = int(in.size.height), .from = 0, .levels = 0};
     push.levels = pyramid_levels(push.width, push.height);
-    Buffer out = g.create_buffer("depth pyramid", 4 * uint64_t(pyramid_first(push.width, push.height, push.levels + 1)));
+    Buffer out =
+        g.create_buffer("depth pyramid", 4 * uint64_t(pyramid_first(push.width, push.height, push.levels + 1)));
     g.dispatch(kDepthPyramid, tiles_of(push.width, push.height),
                {g.uniform(in.frame), g.read(in.rays), g.read(visibility), g.read(mesh_depth), g.write(out)}, push);
     for (push.from = kPyramidAtOnce; push.from < push.levels; push.from += kPyramidAtOnce)

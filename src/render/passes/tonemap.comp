@@ -26,9 +26,6 @@ void main() {
     if (pixel.x >= push.width || pixel.y >= push.height) return;
     vec3 c = texelFetch(radiance, pixel, 0).rgb;
     if (push.added > 0.0) c += texelFetch(glow, pixel, 0).rgb * push.added;
-    if (push.scattered > 0.0) {
-        vec2 at = (vec2(pixel) + 0.5) * vec2(textureSize(glow, 0)) / vec2(push.width, push.height);
-        c = mix(c, bloom_up(at), push.scattered);
-    }
+    if (push.scattered > 0.0) c = mix(c, bloom_up(0.5 * (vec2(pixel) + 0.5)), push.scattered);
     imageStore(shown, pixel, vec4(srgb_from_linear3(tone_map(push.tone_map, c * exposure.multiplier)), 1.0));
 }
