@@ -28,16 +28,22 @@ public:
 
     /// Commands whose time has come, then one fixed step.
     Result<void> step();
+    /// A command, {"add": EDIT} and the like, whose change comes before the next step; refused, it changes nothing.
+    Result<void> command_now(const std::string& command, const std::string& name);
+    /// The world with its bodies between where they were before the last step (0) and where they are (1).
+    Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines);
 
     const physics::World& world() const { return *world_; }
     int64_t steps() const { return steps_; }
     double time() const { return double(steps_) * double(seconds_); }
+    double step_seconds() const { return double(seconds_); }
 
     /// Bodies of the scene in its order, then parts in the order they came loose.
     struct Member {
         std::string id;
         physics::BodyId body;
         physics::MassProperties mass{};
+        physics::Pose before{};  ///< the last step
         std::optional<physics::BodyState>
             rest{};  ///< of a part that has settled back into the world: it is no body any more
     };
@@ -57,7 +63,12 @@ private:
     Result<Edit> edit_of_mesh(const SceneBody& body) const;
     Result<void> check_closed(const SceneBody& body, const Edit& edit) const;
     Result<void> add_triggers();
+    Result<World*> live();
+    void move_meshes(Frame& frame, float between);
+    /// The name of a body's edit that is not what it was at the start; commands must leave those alone.
+    std::optional<std::string> changed_body() const;
     Result<void> apply_commands();
+    Result<void> change_ground();
     Result<void> settle_parts();
     Result<void> cut_settled();
     /// The world's list is this now, but for what came loose; it differs from what was there in `changed`.
@@ -104,7 +115,10 @@ private:
     // Commands.
     std::vector<TimedCommand> commands_;
     size_t done_ = 0;
-    std::optional<World> edited_;  // the world as they change it; made when the first comes
+    bool changed_ = false;       // live_, since the ground was made from it
+    std::optional<World> live_;  // the world as they change it, and as pictures see it; made when it is first needed
+    std::vector<Transform> meshes_shown_;  // by SceneData::meshes, in the last frame
+    double time_shown_ = 0;
 };
 
 }  // namespace kiln::scene
