@@ -16,9 +16,8 @@ struct LinesView {
     std::string_view name;
     PlayLines lines;
 };
-constexpr LinesView kLinesViews[] = {{"contacts", {.contacts = true}},
-                                     {"shapes", {.shapes = true}},
-                                     {"sleeping", {.sleeping = true}}};
+constexpr LinesView kLinesViews[] = {
+    {"contacts", {.contacts = true}}, {"shapes", {.shapes = true}}, {"sleeping", {.sleeping = true}}};
 
 std::string name_of(const std::string& folder, int picture) {
     char name[32];

@@ -29,7 +29,7 @@ int simulate(const Options& o) {
     auto world = World::load(o.scene);
     if (!world) return fail(world.error());
     for (const std::string& section : world->not_drawn_yet())
-        if (section != "meshes" && section != "triggers")
+        if (section != "meshes" && section != "triggers" && section != "characters")
             say("kiln simulate: " + o.scene + ": this version does not simulate \"" + section + "\"");
     SimulateSettings settings = o.settings;
     if (!o.edits.empty()) {

@@ -13,7 +13,7 @@ namespace kiln {
 
 namespace {
 
-constexpr int kMostSteps = 4;            // that one advance() makes
+constexpr int kMostSteps = 4;  // that one advance() makes
 constexpr float kLineWidthPx = 1.5f;
 constexpr float kContactHidden = 0.75f;  // normals point into the other body: they are to be seen through it
 
@@ -41,7 +41,7 @@ void Simulation::move_meshes(Frame& frame, float between) {
     for (size_t i = 0; i < meshes.size(); ++i) {
         if (!impl.meshes.drawn(impl.data, i)) continue;
         MeshInstance& instance = frame.meshes[drawn++];
-        const std::vector<SceneBody>& bodies = impl.data.bodies;
+        const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
         const auto body =
             std::find_if(bodies.begin(), bodies.end(), [&](const SceneBody& b) { return b.mesh == meshes[i].id; });
         if (body != bodies.end()) {
@@ -57,13 +57,17 @@ void Simulation::move_meshes(Frame& frame, float between) {
 Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayLines& shown) {
     const auto world = live();
     if (!world) return world.error();
-    const std::vector<SceneBody>& bodies = (*world)->impl_->data.bodies;
+    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
     for (size_t i = 0; i < bodies.size(); ++i) {
         if (bodies[i].edits.empty()) continue;
         const auto edit = (*world)->find_edit(bodies[i].edits.front());
         if (!edit) continue;
         const Member& m = members_[i];
         if (auto moved = (*world)->move(*edit, blend(m.before, state(m).pose, between)); !moved) return moved.error();
+    }
+    for (const Walker& w : walkers_) {
+        const Pose pose = blend({w.before, {}}, {w.character.position(), {}}, between);
+        if (auto moved = (*world)->move(*(*world)->find_edit(w.shown), pose); !moved) return moved.error();
     }
     auto frame = (*world)->frame(camera);
     if (!frame) return frame;
@@ -73,6 +77,8 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
     std::vector<physics::BodyId> outlined;
     for (const Member& m : members_)
         if (!m.rest && (shown.shapes || (shown.sleeping && world_->state(m.body).asleep))) outlined.push_back(m.body);
+    for (const Walker& w : walkers_)
+        if (shown.shapes) outlined.push_back(w.character.body());
     for (const physics::Line& line : physics::lines(*world_, outlined, {.contacts = false}))
         frame->lines.push_back({line.a, line.b, line.color, kLineWidthPx});
     if (!shown.contacts) return frame;

@@ -75,7 +75,25 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings,
             frames.key("asleep").raw(state.asleep ? "true}" : "false}");
             between = ",";
         }
-        frames.raw("]}");
+        frames.raw("]");
+        if (!simulation.walkers().empty()) {
+            frames.raw(", ").key("characters").raw("[");
+            between = "";
+            for (const scene::Simulation::Walker& w : simulation.walkers()) {
+                const physics::Character& c = w.character;
+                const vec3 feet = c.position() - vec3{0, 0.5f * w.of->numbers.height, 0};
+                frames.raw(between).raw("\n    {").key("id").quoted(w.id).raw(", ");
+                frames.key("position").vector(feet).raw(", ");
+                frames.key("linear_velocity").vector(c.velocity()).raw(", ").key("floor");
+                if (c.on_floor())
+                    frames.quoted(simulation.name_of(c.floor())).raw("}");
+                else
+                    frames.raw("null}");
+                between = ",";
+            }
+            frames.raw("]");
+        }
+        frames.raw("}");
         return each ? each(*play) : Result<void>();
     };
     const int64_t last = int64_t(steps);

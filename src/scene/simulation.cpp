@@ -56,6 +56,7 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
     if (auto done = out->set_ground(std::move(*list), {}); !done) return done.error();
     if (auto done = out->add_bodies(settings); !done) return done.error();
     if (auto done = out->add_triggers(); !done) return done.error();
+    if (auto done = out->add_characters(); !done) return done.error();
     return out;
 }
 
@@ -210,17 +211,20 @@ Result<World*> Simulation::live() {
         auto copy = World::parse(start_.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
         if (!copy) return copy.error();
         live_ = std::move(*copy);
+        if (auto done = show_characters(); !done) return done.error();
     }
     return &*live_;
 }
 
 std::optional<std::string> Simulation::changed_body() const {
     const EditList &before = start_.impl_->edits, &after = live_->impl_->edits;
-    for (const std::string& name : owned_) {
-        const uint32_t had = before.find(name), has = after.find(name);
-        const bool same =
-            had == EditList::kNone ? has == had : has != EditList::kNone && *before[had].edit == *after[has].edit;
-        if (!same) return name;
+    for (const SceneBody& body : start_.impl_->data.bodies) {
+        for (const std::string& name : body.edits) {
+            const uint32_t had = before.find(name), has = after.find(name);
+            const bool same =
+                had == EditList::kNone ? has == had : has != EditList::kNone && *before[had].edit == *after[has].edit;
+            if (!same) return name;
+        }
     }
     return std::nullopt;
 }
@@ -345,6 +349,7 @@ Result<void> Simulation::step() {
     if (auto done = apply_commands(); !done) return done;
     if (auto done = settle_parts(); !done) return done;
     for (Member& m : members_) m.before = state(m).pose;
+    walk();
     world_->step(seconds_);
     ++steps_;
     triggers_.update(*world_);

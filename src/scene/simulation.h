@@ -6,6 +6,7 @@
 
 #include "field/brick_field.h"
 #include "field/loose.h"
+#include "physics/character.h"
 #include "physics/physics.h"
 #include "physics/triggers.h"
 #include "scene/world_impl.h"
@@ -50,6 +51,19 @@ public:
     const std::vector<Member>& members() const { return members_; }
     physics::BodyState state(const Member& m) const { return m.rest ? *m.rest : world_->state(m.body); }
 
+    struct Walker {
+        std::string id;
+        physics::Character character;
+        const SceneCharacter* of;  ///< of the start's
+        size_t next = 0;           ///< wish
+        vec3 walk{};               ///< m/s
+        vec3 before{};             ///< of its centre, the last step
+        std::string shown{};       ///< edit of the live world that pictures show it as
+    };
+    const std::vector<Walker>& walkers() const { return walkers_; }
+    /// Of a body or a character.
+    std::string name_of(physics::BodyId id) const;
+
     /// Of the last step: contacts that began or ended, then who entered or left triggers.
     struct Event {
         const char* type;  ///< "begin", "end", "enter", "leave"
@@ -63,6 +77,9 @@ private:
     Result<Edit> edit_of_mesh(const SceneBody& body) const;
     Result<void> check_closed(const SceneBody& body, const Edit& edit) const;
     Result<void> add_triggers();
+    Result<void> add_characters();
+    Result<void> show_characters();
+    void walk();
     Result<World*> live();
     void move_meshes(Frame& frame, float between);
     /// The name of a body's edit that is not what it was at the start; commands must leave those alone.
@@ -76,7 +93,6 @@ private:
     std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
     Result<void> add(const physics::BodySettings& body, std::string_view name);
     Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
-    std::string name_of(physics::BodyId id) const;
 
     const World& start_;
     std::unique_ptr<physics::World> world_;
@@ -84,6 +100,7 @@ private:
     std::vector<std::string> trigger_names_;  // by index
     std::unordered_set<std::string> owned_;   // edits of bodies
     std::vector<Member> members_;
+    std::vector<Walker> walkers_;
     std::map<physics::BodyId, std::string> names_;  // also of those that are no more
     std::vector<Event> events_;
     float seconds_ = 0;

@@ -95,7 +95,8 @@ TEST(Play, BodiesOfMeshesMoveTheirMeshes) {
         std::ofstream out(folder / "cube.obj");
         for (const char* v : {"0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1"})
             out << "v " << v << "\n";
-        for (const char* f : {"4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"}) out << "f " << f << "\n";
+        for (const char* f : {"4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"})
+            out << "f " << f << "\n";
     }
     const auto world = World::parse(R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}],
       "meshes": [{"id": "gone", "file": "cube.obj", "hidden": true},
