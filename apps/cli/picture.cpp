@@ -25,7 +25,9 @@ constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "s
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
-Result<RenderSettings> settings_of(const PictureOptions& o) {
+}  // namespace
+
+Result<RenderSettings> picture_settings(const PictureOptions& o) {
     RenderSettings s;
     const size_t x = o.size.find('x');
     const auto side = [](std::string_view digits) {
@@ -93,7 +95,6 @@ Result<RenderSettings> settings_of(const PictureOptions& o) {
     return s;
 }
 
-// Sets what --quality asks for; answers its name, "auto" as what it became.
 std::string_view choose_quality(const PictureOptions& o, const Renderer& renderer, RenderSettings& s) {
     if (o.quality.empty()) return kQualities[size_t(Quality::High)];
     const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality) - std::begin(kQualities);
@@ -101,6 +102,8 @@ std::string_view choose_quality(const PictureOptions& o, const Renderer& rendere
     set_quality(s, quality);
     return kQualities[size_t(quality)];
 }
+
+namespace {
 
 Result<void> check_output(const std::string& path) {
     if (path == "-") return usage("-o -: pictures are not written to stdout; name a file");
@@ -304,7 +307,7 @@ int render_sequence(const PictureOptions& o, RenderSettings settings, const Worl
 }  // namespace
 
 int render_picture(const PictureOptions& o) {
-    auto settings = settings_of(o);
+    auto settings = picture_settings(o);
     if (!settings) return fail(settings.error());
     if (auto ok = check_output(o.output); !ok) return fail(ok.error());
 

@@ -6,6 +6,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 namespace kiln::cli {
 
@@ -27,5 +28,12 @@ struct PictureOptions {
 
 /// Renders, writes, reports; answers the exit code.
 int render_picture(const PictureOptions& options);
+
+// Parts of it, for sequences of other verbs.
+
+/// What the options mean, or which of them means nothing.
+Result<RenderSettings> picture_settings(const PictureOptions& options);
+/// Sets what --quality asks for; answers its name, "auto" as what it became.
+std::string_view choose_quality(const PictureOptions& options, const Renderer& renderer, RenderSettings& settings);
 
 }  // namespace kiln::cli

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT
-// kiln simulate SCENE --seconds S: the scene's bodies, run without a window; their ways as JSON.
+// kiln simulate SCENE --seconds S: the scene's bodies, run without a window; their ways as JSON, and as pictures.
 
+#include "cli/film.h"
 #include "cli/json.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
 #include <kiln/world.h>
 
+#include <functional>
 #include <memory>
+#include <optional>
 
 namespace kiln::cli {
 
@@ -16,6 +19,9 @@ namespace {
 struct Options {
     std::string scene, edits;
     SimulateSettings settings;
+    std::string out;
+    PictureOptions pictures;
+    bool png = false;
     bool json = false;
 };
 
@@ -23,7 +29,7 @@ int simulate(const Options& o) {
     auto world = World::load(o.scene);
     if (!world) return fail(world.error());
     for (const std::string& section : world->not_drawn_yet())
-        if (section != "meshes" && section != "triggers")
+        if (section != "meshes" && section != "triggers" && section != "characters")
             say("kiln simulate: " + o.scene + ": this version does not simulate \"" + section + "\"");
     SimulateSettings settings = o.settings;
     if (!o.edits.empty()) {
@@ -31,9 +37,27 @@ int simulate(const Options& o) {
         if (!commands) return fail(commands.error());
         settings.edits = std::move(*commands);
     }
+    std::optional<Film> film;
+    if (o.png) {
+        if (o.out.empty())
+            return fail(Error{"--png wants a folder for its pictures; add --out FOLDER", ErrorKind::Usage});
+        auto opened = Film::open(*world, o.pictures, o.out);
+        if (!opened) return fail(opened.error());
+        film = std::move(*opened);
+    } else if (!o.out.empty()) {
+        return fail(Error{"--out is for pictures; add --png", ErrorKind::Usage});
+    }
+    Progress progress;
+    const auto shoot = [&](Play& play) {
+        progress.stage("picture " + std::to_string(film->pictures()));
+        return film->shoot(play);
+    };
     const Stopwatch watch;
-    const auto ways = world->simulate_json(settings);
+    const auto ways = world->simulate_json(settings, film ? shoot : std::function<Result<void>(Play&)>());
+    progress.stage("");
     if (!ways) return fail(ways.error());
+    if (film)
+        say("wrote    " + std::to_string(film->pictures()) + " pictures, " + o.out + "/frame_00000.png and so on");
     if (o.json) {
         (void)put(*ways);
     } else {
@@ -47,13 +71,14 @@ int simulate(const Options& o) {
 
 void add_simulate(CLI::App& app, Run& run) {
     auto o = std::make_shared<Options>();
-    CLI::App* verb =
-        app.add_subcommand("simulate",
-                           "Runs a scene's bodies without a window.\n\n"
-                           "The answer is the same for any number of threads.\n\n"
-                           "Examples:\n"
-                           "  kiln simulate tumble --seconds 2 --every 0.5 --json\n"
-                           "  kiln simulate scene.kiln.json --seconds 10 --backend bullet --field-bodies --json");
+    CLI::App* verb = app.add_subcommand(
+        "simulate",
+        "Runs a scene's bodies without a window.\n\n"
+        "The answer is the same for any number of threads.\n\n"
+        "Examples:\n"
+        "  kiln simulate tumble --seconds 2 --every 0.5 --json\n"
+        "  kiln simulate scene.kiln.json --seconds 10 --backend bullet --field-bodies --json\n"
+        "  kiln simulate tumble --seconds 4 --every 0.1 --out pictures --png --size 640x360 --view contacts");
     verb->add_option("scene", o->scene, "scene file, or the name of a bundled scene")->required();
     verb->add_option("--seconds", o->settings.seconds, "how long")->required();
     verb->add_option("--every", o->settings.every, "seconds between frames; left out: each step");
@@ -63,6 +88,16 @@ void add_simulate(CLI::App& app, Run& run) {
     verb->add_option("--edits", o->edits,
                      "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");
+    verb->add_option("--out", o->out, "folder, which must be there, for --png");
+    verb->add_flag("--png", o->png, "a picture of each frame: frame_00000.png and so on");
+    verb->add_option("--size", o->pictures.size, "of the pictures: WIDTHxHEIGHT in pixels")->capture_default_str();
+    verb->add_option("--camera", o->pictures.camera, "of the pictures; left out: the scene's first");
+    verb->add_option("--view", o->pictures.view,
+                     "of the pictures: as of render, or contacts, shapes, sleeping: lines over the shaded picture")
+        ->capture_default_str();
+    verb->add_option("--device", o->pictures.device, "of the pictures: auto, cpu-vulkan or part of a device's name")
+        ->capture_default_str();
+    verb->add_option("--quality", o->pictures.quality, "of the pictures: low, medium, high, ultra or auto");
     verb->add_flag("--json", o->json, "the ways of all bodies, one object, on stdout");
     verb->callback([o, &run] { run = [o] { return simulate(*o); }; });
 }

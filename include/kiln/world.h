@@ -12,6 +12,7 @@
 #include <kiln/shapes.h>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -20,6 +21,7 @@
 
 namespace kiln {
 
+class Play;
 namespace scene {
 class Simulation;
 }
@@ -204,8 +206,9 @@ public:
     Result<Mesh> mesh(const MeshSettings& settings = {}) const;
 
     /// Runs the scene's bodies from their start and tells their ways as JSON (`kiln simulate --json`); the world stays as it is. Fails on
-    /// bodies that cannot be simulated, and on a backend that there is not.
-    Result<std::string> simulate_json(const SimulateSettings& settings = {}) const;
+    /// bodies that cannot be simulated, and on a backend that there is not. `each` sees the play at every frame of the answer.
+    Result<std::string> simulate_json(const SimulateSettings& settings = {},
+                                      const std::function<Result<void>(Play&)>& each = {}) const;
 
     /// Facts about the scene for people and programs (`kiln inspect`): counts, bounds, voxel size, bricks, bytes.
     std::string inspect_json() const;
@@ -222,9 +225,48 @@ public:
 
 private:
     friend class History;
+    friend class Play;
     friend class scene::Simulation;
     friend struct SceneDifference compare_scenes(const World& a, const World& b);
     std::unique_ptr<Impl> impl_;
+};
+
+/// Lines over a picture of a play, for whoever looks for a fault.
+struct PlayLines {
+    bool shapes = false;    ///< outlines of bodies as the engine has them, in the colour of how they move
+    bool sleeping = false;  ///< … of those that sleep
+    bool contacts = false;  ///< a short line along the normal of each contact
+};
+
+/// A world's bodies, running, while the world itself stays as it is. It must outlive the play. Owner's thread.
+///   auto play = kiln::Play::start(world);   play->advance(seconds);   renderer->render(*play->frame(camera));
+class Play {
+public:
+    /// `seconds` and `every` of the settings say nothing here.
+    static Result<Play> start(const World& world, const SimulateSettings& settings = {});
+    Play(Play&&) noexcept;
+    Play& operator=(Play&&) noexcept;
+    ~Play();
+
+    /// One fixed step: commands whose time has come, then physics.
+    Result<void> step();
+    /// So much time has gone by: makes the steps that are due, four at most (what is more is dropped, and counted), and answers how many.
+    Result<int> advance(double seconds);
+    /// Of the last step, seconds.
+    double time() const;
+    double dropped_seconds() const { return dropped_; }
+    /// A change of the world's own edits, {"add": EDIT} and the like, before the next step.
+    Result<void> apply(const std::string& command, const std::string& name = "command");
+    /// The world with its bodies where they are: after step() those of the last step, after advance() as far between the last two as time
+    /// has gone on. Each frame moves on from the one before (motion).
+    Result<Frame> frame(const Camera& camera, const PlayLines& lines = {});
+
+private:
+    friend class World;
+    explicit Play(std::unique_ptr<scene::Simulation> simulation);
+    std::unique_ptr<scene::Simulation> simulation_;
+    double ahead_ = 0, dropped_ = 0;  // seconds
+    float between_ = 1;               // the step before … the last one
 };
 
 /// A physics engine that this build has; `why_not` says why it cannot run on this machine, empty when it can.

@@ -193,6 +193,23 @@ constexpr KeyRow kTriggerRows[] = {
     plain("rotation", KeyType::Rotation, "quaternion [x, y, z, w]"),
     plain("scale", KeyType::Scale, "a number or three, > 0"),
 };
+constexpr KeyRow kWishRows[] = {
+    needed(number("time", KILN_AT(SceneCharacter::Wish, time), 0, "s", ">= 0", "from when on it is wished")),
+    numbers("direction", 3, KILN_AT(SceneCharacter::Wish, direction), {0, 0, 0}, "1", "any",
+            "to walk in: its level part, of length 1 at most; 0 stands"),
+    number("jump", KILN_AT(SceneCharacter::Wish, jump), 0, "m/s", ">= 0", "upwards, once, if it stands then"),
+};
+constexpr KeyRow kCharacterRows[] = {
+    needed(plain("id", KeyType::Text, "unique name")),
+    numbers("position", 3, KILN_AT(SceneCharacter::Numbers, position), {0, 0, 0}, "m", "any", "of its feet"),
+    number("radius", KILN_AT(SceneCharacter::Numbers, radius), 0.3f, "m", "> 0", "of its capsule"),
+    number("height", KILN_AT(SceneCharacter::Numbers, height), 1.7f, "m", "> 0", "of its capsule, from end to end"),
+    number("speed", KILN_AT(SceneCharacter::Numbers, speed), 1.5f, "m/s", ">= 0", "of its walk"),
+    number("step_height", KILN_AT(SceneCharacter::Numbers, step_height), 0.3f, "m", ">= 0", "that it steps onto"),
+    number("steepest_deg", KILN_AT(SceneCharacter::Numbers, steepest_deg), 50, "deg", "[0, 89]",
+           "of a floor that it stands on"),
+    inside("path", KeyType::List, kWishTable, "what it wishes, by time; each holds until the next"),
+};
 constexpr KeyRow kClothRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
     numbers("size", 2, kKept, {1, 1, 0}, "m", "> 0", "along local X and Z"),
@@ -234,6 +251,7 @@ constexpr KeyRow kSceneRows[] = {
     inside("physics", KeyType::Object, kPhysicsTable, "of the whole world"),
     inside("bodies", KeyType::List, kBodyTable, "rigid bodies"),
     inside("triggers", KeyType::List, kTriggerTable, "regions that tell who enters and leaves"),
+    inside("characters", KeyType::List, kCharacterTable, "capsules that walk"),
     inside("cloths", KeyType::List, kClothTable, "rectangles of cloth"),
     inside("fluids", KeyType::List, kFluidTable, "particle fluids"),
     numbers("wind", 3, kKept, {0, 0, 0}, "m/s", "any", "on cloth and fluid"),
@@ -258,6 +276,8 @@ const Table kMeshTable{"mesh", "A triangle mesh", kMeshRows};
 const Table kPhysicsTable{"physics", "Physics of the world", kPhysicsRows};
 const Table kBodyTable{"body", "A rigid body", kBodyRows};
 const Table kTriggerTable{"trigger", "A region that tells who enters and leaves", kTriggerRows};
+const Table kWishTable{"wish", "Where a character wishes to go", kWishRows};
+const Table kCharacterTable{"character", "An upright capsule that walks", kCharacterRows};
 const Table kClothTable{"cloth", "A rectangle of cloth in its local XZ plane", kClothRows};
 const Table kFluidTable{"fluid", "A particle fluid", kFluidRows};
 

@@ -51,7 +51,8 @@ extern const Table kSceneTable;  // the whole file
 extern const Table kFieldTable, kBoundsTable, kMaterialTable, kLightTable, kEnvironmentTable, kCameraTable;
 extern const Table kEditTable;  // keys of edits, the node's among them
 extern const Table kNodeTable;  // keys of nodes in objects
-extern const Table kOutlineTable, kMeshTable, kPhysicsTable, kBodyTable, kTriggerTable, kClothTable, kFluidTable;
+extern const Table kOutlineTable, kMeshTable, kPhysicsTable, kBodyTable, kTriggerTable, kWishTable, kCharacterTable,
+    kClothTable, kFluidTable;
 
 extern const std::span<const std::string_view> kOpNames, kLightNames, kToneMapNames, kBloomKindNames, kAxisNames,
     kMotionNames;

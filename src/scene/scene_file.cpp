@@ -212,10 +212,39 @@ private:
         return true;
     }
 
+    bool character(JsonIndex at, const std::unordered_map<std::string_view, uint32_t>& bodies) {
+        SceneCharacter out;
+        const JsonIndex id = *doc_.find(at, "id");
+        out.id = doc_.text(id);
+        out.place = at;
+        // Events tell of both.
+        if (bodies.contains(out.id)) return in_.fail(id, "a body has this id too; choose another");
+        if (!in_.table(at, kCharacterTable, &out.numbers.position.x)) return false;
+        if (const auto h = doc_.find(at, "height"); !(out.numbers.height > 2 * out.numbers.radius))
+            return in_.fail(h ? *h : at,
+                            formatted("a height of {} is not above twice the radius, {}; make one larger or the other "
+                                      "smaller",
+                                      shortest(out.numbers.height), shortest(2 * out.numbers.radius)));
+        if (const auto path = doc_.find(at, "path")) {
+            for (JsonIndex c = doc_.first(*path); c < doc_.next(*path); c = doc_.next(c)) {
+                SceneCharacter::Wish wish;
+                if (!in_.table(c, kWishTable, &wish.time)) return false;
+                if (!out.path.empty() && wish.time < out.path.back().time)
+                    return in_.fail(*doc_.find(c, "time"),
+                                    formatted("{} is before the wish above, {}; list wishes by ascending time",
+                                              shortest(wish.time), shortest(out.path.back().time)));
+                out.path.push_back(wish);
+            }
+        }
+        scene_.characters.push_back(std::move(out));
+        return true;
+    }
+
     bool later_sections() {
-        std::unordered_map<std::string_view, uint32_t> meshes, bodies, triggers, cloths, fluids, edit_ids, object_names;
-        if (!ids("meshes", meshes) || !ids("bodies", bodies) || !ids("triggers", triggers) || !ids("cloths", cloths) ||
-            !ids("fluids", fluids))
+        std::unordered_map<std::string_view, uint32_t> meshes, bodies, triggers, characters, cloths, fluids, edit_ids,
+            object_names;
+        if (!ids("meshes", meshes) || !ids("bodies", bodies) || !ids("triggers", triggers) ||
+            !ids("characters", characters) || !ids("cloths", cloths) || !ids("fluids", fluids))
             return false;
         const auto known = [](const auto& map) {
             std::vector<std::string_view> names;
@@ -287,6 +316,9 @@ private:
                 scene_.triggers.push_back(std::move(trigger));
             }
         }
+        if (const auto at = section("characters"))
+            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c))
+                if (!character(c, bodies)) return false;
         return true;
     }
 

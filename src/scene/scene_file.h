@@ -55,6 +55,23 @@ struct SceneTrigger {
     JsonIndex place = 0;
 };
 
+/// An entry of "characters".
+struct SceneCharacter {
+    struct Numbers {
+        vec3 position{};  ///< of its feet
+        float radius = 0.3f, height = 1.7f, speed = 1.5f, step_height = 0.3f, steepest_deg = 50;
+    };
+    struct Wish {
+        float time = 0;
+        vec3 direction{};
+        float jump = 0;
+    };
+    std::string id;
+    Numbers numbers;
+    std::vector<Wish> path;  ///< by ascending time
+    JsonIndex place = 0;
+};
+
 /// An entry of "meshes". Saving keeps it as its file has it.
 struct SceneMesh {
     std::string id, file;
@@ -92,6 +109,7 @@ struct SceneData {
     ScenePhysics physics;
     std::vector<SceneBody> bodies;
     std::vector<SceneTrigger> triggers;
+    std::vector<SceneCharacter> characters;
     std::vector<SceneMesh> meshes;
 
     // Where things stand in `source`; kNowhere for what was added later.

@@ -65,7 +65,7 @@ SceneMeshes load_meshes(const SceneData& scene) {
 std::vector<MeshInstance> SceneMeshes::instances(const SceneData& scene) const {
     std::vector<MeshInstance> out;
     for (size_t i = 0; i < models.size(); ++i)
-        if (models[i] && !scene.meshes[i].hidden)
+        if (drawn(scene, i))
             out.push_back({models[i], scene.meshes[i].transform, scene.meshes[i].transform, scene.meshes[i].outline});
     return out;
 }

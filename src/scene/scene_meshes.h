@@ -18,6 +18,7 @@ struct SceneMeshes {
     std::vector<std::string> faults;                             ///< errors as the reader writes them, with their place
     std::vector<std::string> notes;                              ///< what of a model is not drawn
 
+    bool drawn(const SceneData& scene, size_t mesh) const { return models[mesh] && !scene.meshes[mesh].hidden; }
     /// What a frame draws of them: all that are not hidden.
     std::vector<MeshInstance> instances(const SceneData& scene) const;
     /// World box of what is drawn.

@@ -46,7 +46,8 @@ std::vector<PhysicsBackend> physics_backends() {
     return out;
 }
 
-Result<std::string> World::simulate_json(const SimulateSettings& settings) const {
+Result<std::string> World::simulate_json(const SimulateSettings& settings,
+                                         const std::function<Result<void>(Play&)>& each) const {
     const double step = double(impl_->data.physics.step), steps = std::round(settings.seconds / step);
     if (!std::isfinite(settings.seconds) || settings.seconds < 0 || !(steps <= kMostSteps))
         return Error{formatted("simulating {} s: write a finite time of 0 or more, at most {} steps of {} s",
@@ -55,13 +56,13 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
     if (!std::isfinite(settings.every) || settings.every < 0 || settings.threads < 0)
         return Error{"simulating: the time between frames and the number of threads must be 0 or more",
                      ErrorKind::Usage};
-    auto made = scene::Simulation::make(*this, settings);
-    if (!made) return made.error();
-    scene::Simulation& simulation = **made;
+    auto play = Play::start(*this, settings);
+    if (!play) return play.error();
+    scene::Simulation& simulation = *play->simulation_;
     const physics::World& world = simulation.world();
 
     Text frames, events;
-    const auto frame = [&] {
+    const auto frame = [&]() -> Result<void> {
         frames.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("bodies").raw("[");
         const char* between = "";
         for (const scene::Simulation::Member& m : simulation.members()) {
@@ -74,21 +75,40 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings) const
             frames.key("asleep").raw(state.asleep ? "true}" : "false}");
             between = ",";
         }
-        frames.raw("]}");
+        frames.raw("]");
+        if (!simulation.walkers().empty()) {
+            frames.raw(", ").key("characters").raw("[");
+            between = "";
+            for (const scene::Simulation::Walker& w : simulation.walkers()) {
+                const physics::Character& c = w.character;
+                const vec3 feet = c.position() - vec3{0, 0.5f * w.of->numbers.height, 0};
+                frames.raw(between).raw("\n    {").key("id").quoted(w.id).raw(", ");
+                frames.key("position").vector(feet).raw(", ");
+                frames.key("linear_velocity").vector(c.velocity()).raw(", ").key("floor");
+                if (c.on_floor())
+                    frames.quoted(simulation.name_of(c.floor())).raw("}");
+                else
+                    frames.raw("null}");
+                between = ",";
+            }
+            frames.raw("]");
+        }
+        frames.raw("}");
+        return each ? each(*play) : Result<void>();
     };
     const int64_t last = int64_t(steps);
-    frame();
+    if (auto done = frame(); !done) return done.error();
     // Frames fall on the steps nearest to multiples of `every`.
     int64_t shown = 1;
     for (int64_t i = 1; i <= last; ++i) {
-        if (auto done = simulation.step(); !done) return done.error();
+        if (auto done = play->step(); !done) return done.error();
         for (const scene::Simulation::Event& e : simulation.events()) {
             events.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("type").quoted(e.type);
             events.raw(", ").key("a").quoted(e.a).raw(", ").key("b").quoted(e.b).raw("}");
         }
         const bool due = settings.every <= step || i >= int64_t(std::llround(double(shown) * settings.every / step));
         if (!due && i != last) continue;
-        frame();
+        if (auto done = frame(); !done) return done.error();
         ++shown;
     }
     Text bodies;

@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <thread>
+#include <utility>
 
 namespace kiln::scene {
 
@@ -20,6 +21,7 @@ constexpr const char* kWorldName = "world";
 constexpr float kPartDensity = 1000;  // kg/m³, a body's default
 constexpr float kSettleSeconds = 2;   // a part asleep for so long is ground again
 constexpr int kMeshResolution = 64;   // cells along the longest side of a body's mesh
+constexpr const char* kBodysOwn = "is a body's; commands change the world's own edits while bodies run";
 
 // The scene's own where no material says.
 std::vector<physics::Surface> surfaces_of(const SceneData& data) {
@@ -54,6 +56,7 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
     if (auto done = out->set_ground(std::move(*list), {}); !done) return done.error();
     if (auto done = out->add_bodies(settings); !done) return done.error();
     if (auto done = out->add_triggers(); !done) return done.error();
+    if (auto done = out->add_characters(); !done) return done.error();
     return out;
 }
 
@@ -74,7 +77,7 @@ Result<void> Simulation::add(const physics::BodySettings& body, std::string_view
     physics::MassProperties mass;
     mass.mass = world_->mass(*id);
     mass.center = world_->center_of_mass(*id);
-    members_.push_back({std::string(name), *id, mass});
+    members_.push_back({std::string(name), *id, mass, body.pose});
     names_.emplace(*id, name);
     return {};
 }
@@ -201,39 +204,65 @@ Result<void> Simulation::add_triggers() {
     return {};
 }
 
+Result<World*> Simulation::live() {
+    if (!live_) {
+        const SceneData& data = start_.impl_->data;
+        // Bundled models are known by the scene's name.
+        auto copy = World::parse(start_.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
+        if (!copy) return copy.error();
+        live_ = std::move(*copy);
+        if (auto done = show_characters(); !done) return done.error();
+    }
+    return &*live_;
+}
+
+std::optional<std::string> Simulation::changed_body() const {
+    const EditList &before = start_.impl_->edits, &after = live_->impl_->edits;
+    for (const SceneBody& body : start_.impl_->data.bodies) {
+        for (const std::string& name : body.edits) {
+            const uint32_t had = before.find(name), has = after.find(name);
+            const bool same =
+                had == EditList::kNone ? has == had : has != EditList::kNone && *before[had].edit == *after[has].edit;
+            if (!same) return name;
+        }
+    }
+    return std::nullopt;
+}
+
+Result<void> Simulation::command_now(const std::string& command, const std::string& name) {
+    const auto world = live();
+    if (!world) return world.error();
+    History history = (*world)->history();
+    if (auto applied = (*world)->apply(command, name); !applied) return applied;
+    changed_ = true;
+    const auto body = changed_body();
+    if (!body) return {};
+    if (const auto undone = history.undo(); !undone) return undone.error();
+    return Error{formatted("{}: \"{}\" {}", name, *body, kBodysOwn), ErrorKind::Input};
+}
+
 Result<void> Simulation::apply_commands() {
     const double now = time();
-    bool any = false;
     for (; done_ < commands_.size() && commands_[done_].time <= now + 1e-9; ++done_) {
-        const World::Impl& before = *start_.impl_;
-        if (!edited_) {
-            const std::string& folder = before.data.folder;
-            auto copy = World::parse(start_.to_json(), folder.empty() ? "scene" : folder + "/scene");
-            if (!copy) return copy.error();
-            edited_ = std::move(*copy);
-        }
+        const auto world = live();
+        if (!world) return world.error();
         const TimedCommand& command = commands_[done_];
-        if (auto applied = edited_->apply(command); !applied) return applied;
-        const World::Impl& after = *edited_->impl_;
-        for (const std::string& name : owned_) {
-            const uint32_t had = before.edits.find(name), has = after.edits.find(name);
-            const bool same = had == EditList::kNone
-                                  ? has == had
-                                  : has != EditList::kNone && *before.edits[had].edit == *after.edits[has].edit;
-            if (same) continue;
-            return Error{formatted("{}:{}: \"{}\" is a body's; commands change the world's own edits while bodies run",
-                                   command.file, command.line, name),
-                         ErrorKind::Input};
-        }
-        any = true;
+        if (auto applied = (*world)->apply(command); !applied) return applied;
+        changed_ = true;
+        if (const auto body = changed_body())
+            return Error{formatted("{}:{}: \"{}\" {}", command.file, command.line, *body, kBodysOwn), ErrorKind::Input};
     }
-    if (!any) return {};
-    std::vector<Edit> there = ground_of(*edited_->impl_, owned_);
-    const auto box = changed_box(*edited_->impl_, edits_, there);
+    return std::exchange(changed_, false) ? change_ground() : Result<void>();
+}
+
+// The ground becomes what live_ has, and what that cuts loose becomes bodies.
+Result<void> Simulation::change_ground() {
+    std::vector<Edit> there = ground_of(*live_->impl_, owned_);
+    const auto box = changed_box(*live_->impl_, edits_, there);
     if (!box) return box.error();
     edits_ = std::move(there);
     if (auto done = cut_settled(); !done) return done;
-    auto list = field_of(*edited_->impl_, edits_);
+    auto list = field_of(*live_->impl_, edits_);
     if (!list) return list.error();
     const std::shared_ptr<const field::SdfField> before = ground_;
     if (auto done = set_ground(*list, *box); !done) return done;
@@ -305,7 +334,7 @@ Result<void> Simulation::cut_settled() {
         }
         std::shared_ptr<const field::SdfField> left = part.field;
         if (!digs.empty()) {
-            auto dug = field_of(*edited_->impl_, digs);
+            auto dug = field_of(*live_->impl_, digs);
             if (!dug) return dug.error();
             const Box3 box = (*dug)->bounds();
             left = std::make_shared<const field::LayeredField>(
@@ -319,6 +348,8 @@ Result<void> Simulation::cut_settled() {
 Result<void> Simulation::step() {
     if (auto done = apply_commands(); !done) return done;
     if (auto done = settle_parts(); !done) return done;
+    for (Member& m : members_) m.before = state(m).pose;
+    walk();
     world_->step(seconds_);
     ++steps_;
     triggers_.update(*world_);

@@ -6,6 +6,7 @@
 
 #include "field/brick_field.h"
 #include "field/loose.h"
+#include "physics/character.h"
 #include "physics/physics.h"
 #include "physics/triggers.h"
 #include "scene/world_impl.h"
@@ -28,21 +29,40 @@ public:
 
     /// Commands whose time has come, then one fixed step.
     Result<void> step();
+    /// A command, {"add": EDIT} and the like, whose change comes before the next step; refused, it changes nothing.
+    Result<void> command_now(const std::string& command, const std::string& name);
+    /// The world with its bodies between where they were before the last step (0) and where they are (1).
+    Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines);
 
     const physics::World& world() const { return *world_; }
     int64_t steps() const { return steps_; }
     double time() const { return double(steps_) * double(seconds_); }
+    double step_seconds() const { return double(seconds_); }
 
     /// Bodies of the scene in its order, then parts in the order they came loose.
     struct Member {
         std::string id;
         physics::BodyId body;
         physics::MassProperties mass{};
+        physics::Pose before{};  ///< the last step
         std::optional<physics::BodyState>
             rest{};  ///< of a part that has settled back into the world: it is no body any more
     };
     const std::vector<Member>& members() const { return members_; }
     physics::BodyState state(const Member& m) const { return m.rest ? *m.rest : world_->state(m.body); }
+
+    struct Walker {
+        std::string id;
+        physics::Character character;
+        const SceneCharacter* of;  ///< of the start's
+        size_t next = 0;           ///< wish
+        vec3 walk{};               ///< m/s
+        vec3 before{};             ///< of its centre, the last step
+        std::string shown{};       ///< edit of the live world that pictures show it as
+    };
+    const std::vector<Walker>& walkers() const { return walkers_; }
+    /// Of a body or a character.
+    std::string name_of(physics::BodyId id) const;
 
     /// Of the last step: contacts that began or ended, then who entered or left triggers.
     struct Event {
@@ -57,7 +77,15 @@ private:
     Result<Edit> edit_of_mesh(const SceneBody& body) const;
     Result<void> check_closed(const SceneBody& body, const Edit& edit) const;
     Result<void> add_triggers();
+    Result<void> add_characters();
+    Result<void> show_characters();
+    void walk();
+    Result<World*> live();
+    void move_meshes(Frame& frame, float between);
+    /// The name of a body's edit that is not what it was at the start; commands must leave those alone.
+    std::optional<std::string> changed_body() const;
     Result<void> apply_commands();
+    Result<void> change_ground();
     Result<void> settle_parts();
     Result<void> cut_settled();
     /// The world's list is this now, but for what came loose; it differs from what was there in `changed`.
@@ -65,7 +93,6 @@ private:
     std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
     Result<void> add(const physics::BodySettings& body, std::string_view name);
     Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
-    std::string name_of(physics::BodyId id) const;
 
     const World& start_;
     std::unique_ptr<physics::World> world_;
@@ -73,6 +100,7 @@ private:
     std::vector<std::string> trigger_names_;  // by index
     std::unordered_set<std::string> owned_;   // edits of bodies
     std::vector<Member> members_;
+    std::vector<Walker> walkers_;
     std::map<physics::BodyId, std::string> names_;  // also of those that are no more
     std::vector<Event> events_;
     float seconds_ = 0;
@@ -104,7 +132,10 @@ private:
     // Commands.
     std::vector<TimedCommand> commands_;
     size_t done_ = 0;
-    std::optional<World> edited_;  // the world as they change it; made when the first comes
+    bool changed_ = false;       // live_, since the ground was made from it
+    std::optional<World> live_;  // the world as they change it, and as pictures see it; made when it is first needed
+    std::vector<Transform> meshes_shown_;  // by SceneData::meshes, in the last frame
+    double time_shown_ = 0;
 };
 
 }  // namespace kiln::scene

@@ -453,6 +453,34 @@ TEST_F(CliGpu, ATierIsDrawnByOrRefusedInOneLine) {
     EXPECT_THAT(typo.err, HasSubstr("--tier mseh: there is no such tier; did you mean mesh?"));
 }
 
+TEST_F(CliGpu, SimulateDrawsAPictureAFrame) {
+    write(
+        "s.kiln.json",
+        R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}, {"id": "e", "shape": "sphere", "position": [0, 1.5, 0]}],
+  "bodies": [{"id": "ball", "edits": ["e"]}]})");
+    fs::create_directory(folder_ / "p");
+    const std::string words = "simulate s.kiln.json --seconds 0.5 --every 0.25 --png --size 24x16 ";
+    for (const char* view : {"contacts", "depth"}) {
+        const Outcome o = run(words + "--out p --json --view " + view);
+        EXPECT_EQ(o.code, 0) << o.err;
+        EXPECT_THAT(o.out, HasSubstr("\"frames\": ["));
+        for (const char* name : {"p/frame_00000.png", "p/frame_00001.png", "p/frame_00002.png"})
+            EXPECT_TRUE(fs::remove(folder_ / name)) << view << name;
+        EXPECT_TRUE(fs::is_empty(folder_ / "p")) << view;
+    }
+    EXPECT_EQ(run(words + "--out p --camera nobody").code, 2);
+    const Outcome near = run(words + "--out p --view contact");
+    EXPECT_EQ(near.code, 2);
+    EXPECT_THAT(near.err, HasSubstr("did you mean contacts?"));
+    const Outcome away = run(words + "--out nowhere");
+    EXPECT_EQ(away.code, 1);
+    EXPECT_THAT(away.err, HasSubstr("nowhere"));
+    EXPECT_EQ(run(words).code, 2) << "no folder";
+    EXPECT_EQ(run("simulate s.kiln.json --seconds 1 --out p").code, 2) << "no pictures";
+    EXPECT_EQ(run(words + "--out p", kNoVulkan).code, 4);
+    EXPECT_TRUE(fs::is_empty(folder_ / "p"));
+}
+
 TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
     write("later.kiln.json",
           "{\"format\": 1, \"cloths\": [{\"id\": \"flag\", \"size\": [1, 1]}], \"edits\": [{\"shape\": \"sphere\"}]}");

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: MIT
+// Play: a simulation fed with the time that goes by, and its pictures. Bodies of edits are movers of the simulation's own world
+// (movers.h), bodies of meshes move the frame's meshes.
+
+#include "physics/debug_lines.h"
+#include "scene/simulation.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace kiln {
+
+namespace {
+
+constexpr int kMostSteps = 4;  // that one advance() makes
+constexpr float kLineWidthPx = 1.5f;
+constexpr float kContactHidden = 0.75f;  // normals point into the other body: they are to be seen through it
+
+// Along the shorter way round; a step turns things so little that the straight line is as good as the arc.
+Pose blend(const Pose& a, const Pose& b, float t) {
+    const quat p = a.rotation, q = b.rotation;
+    const float sign = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w < 0 ? -t : t, s = 1 - t;
+    const quat r{s * p.x + sign * q.x, s * p.y + sign * q.y, s * p.z + sign * q.z, s * p.w + sign * q.w};
+    const float size = std::sqrt(r.x * r.x + r.y * r.y + r.z * r.z + r.w * r.w);
+    if (!(size > 0)) return b;
+    return {a.position * s + b.position * t, {r.x / size, r.y / size, r.z / size, r.w / size}};
+}
+
+}  // namespace
+
+namespace scene {
+
+// Of the bodies that meshes are: the frame's meshes stand where those are.
+void Simulation::move_meshes(Frame& frame, float between) {
+    const World::Impl& impl = *live_->impl_;
+    const std::vector<SceneMesh>& meshes = impl.data.meshes;
+    const bool first = meshes_shown_.size() != meshes.size();
+    meshes_shown_.resize(meshes.size());
+    size_t drawn = 0;
+    for (size_t i = 0; i < meshes.size(); ++i) {
+        if (!impl.meshes.drawn(impl.data, i)) continue;
+        MeshInstance& instance = frame.meshes[drawn++];
+        const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
+        const auto body =
+            std::find_if(bodies.begin(), bodies.end(), [&](const SceneBody& b) { return b.mesh == meshes[i].id; });
+        if (body != bodies.end()) {
+            const Member& m = members_[size_t(body - bodies.begin())];
+            const Pose pose = blend(m.before, state(m).pose, between);
+            instance.transform = {pose.position, pose.rotation, meshes[i].transform.scale};
+        }
+        instance.before = first ? instance.transform : meshes_shown_[i];
+        meshes_shown_[i] = instance.transform;
+    }
+}
+
+Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayLines& shown) {
+    const auto world = live();
+    if (!world) return world.error();
+    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
+    for (size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i].edits.empty()) continue;
+        const auto edit = (*world)->find_edit(bodies[i].edits.front());
+        if (!edit) continue;
+        const Member& m = members_[i];
+        if (auto moved = (*world)->move(*edit, blend(m.before, state(m).pose, between)); !moved) return moved.error();
+    }
+    for (const Walker& w : walkers_) {
+        const Pose pose = blend({w.before, {}}, {w.character.position(), {}}, between);
+        if (auto moved = (*world)->move(*(*world)->find_edit(w.shown), pose); !moved) return moved.error();
+    }
+    auto frame = (*world)->frame(camera);
+    if (!frame) return frame;
+    move_meshes(*frame, between);
+    frame->time = time() - (1 - double(between)) * step_seconds();
+    frame->time_before = std::exchange(time_shown_, frame->time);
+    std::vector<physics::BodyId> outlined;
+    for (const Member& m : members_)
+        if (!m.rest && (shown.shapes || (shown.sleeping && world_->state(m.body).asleep))) outlined.push_back(m.body);
+    for (const Walker& w : walkers_)
+        if (shown.shapes) outlined.push_back(w.character.body());
+    for (const physics::Line& line : physics::lines(*world_, outlined, {.contacts = false}))
+        frame->lines.push_back({line.a, line.b, line.color, kLineWidthPx});
+    if (!shown.contacts) return frame;
+    for (const physics::Line& line : physics::lines(*world_, {}))
+        frame->lines.push_back({line.a, line.b, line.color, kLineWidthPx, kContactHidden});
+    return frame;
+}
+
+}  // namespace scene
+
+Play::Play(std::unique_ptr<scene::Simulation> simulation) : simulation_(std::move(simulation)) {}
+Play::Play(Play&&) noexcept = default;
+Play& Play::operator=(Play&&) noexcept = default;
+Play::~Play() = default;
+
+Result<Play> Play::start(const World& world, const SimulateSettings& settings) {
+    auto made = scene::Simulation::make(world, settings);
+    if (!made) return made.error();
+    return Play(std::move(*made));
+}
+
+Result<void> Play::step() {
+    between_ = 1;
+    return simulation_->step();
+}
+
+Result<int> Play::advance(double seconds) {
+    if (!std::isfinite(seconds) || seconds < 0)
+        return Error{"playing: time goes on by a finite number of seconds, 0 or more", ErrorKind::Usage};
+    const double step = simulation_->step_seconds();
+    ahead_ += seconds;
+    int made = 0;
+    for (; made < kMostSteps && ahead_ >= step; ++made, ahead_ -= step)
+        if (auto done = simulation_->step(); !done) return done.error();
+    if (ahead_ >= step) {
+        const double left = std::fmod(ahead_, step);
+        dropped_ += ahead_ - left;
+        ahead_ = left;
+    }
+    between_ = float(ahead_ / step);
+    return made;
+}
+
+double Play::time() const { return simulation_->time(); }
+
+Result<void> Play::apply(const std::string& command, const std::string& name) {
+    return simulation_->command_now(command, name);
+}
+
+Result<Frame> Play::frame(const Camera& camera, const PlayLines& lines) {
+    return simulation_->frame(camera, between_, lines);
+}
+
+}  // namespace kiln
