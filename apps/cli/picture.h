@@ -19,7 +19,10 @@ struct PictureOptions {
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
          atlas_by_copy = false;
     bool taa = false;
-    std::string quality;  ///< low, medium, high, ultra or auto; empty: high
+    std::string quality;                ///< low, medium, high, ultra or auto; empty: high
+    std::string shadows = "rays";       ///< of meshes: rays or cascades
+    std::string lighting = "clusters";  ///< clusters or volumes
+    float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };
