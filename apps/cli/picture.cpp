@@ -9,6 +9,7 @@
 #include <kiln/world.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <vector>
@@ -17,10 +18,10 @@ namespace kiln::cli {
 
 namespace {
 
-constexpr int kPicturesOfOneView = 16;  // with --taa, a round of the renderer's jitter
-
 constexpr std::string_view kTiers[] = {"auto", "compute", "rt", "mesh"};
 constexpr std::string_view kQualities[] = {"low", "medium", "high", "ultra", "auto"};
+constexpr std::string_view kShadows[] = {"rays", "cascades"};
+constexpr std::string_view kLightings[] = {"clusters", "volumes"};
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
@@ -58,6 +59,24 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
                      (near.empty() ? "use auto, compute, rt or mesh" : "did you mean " + std::string(near) + "?"));
     }
     s.tier = Tier(tier - std::begin(kTiers));
+    const auto shadows = std::find(std::begin(kShadows), std::end(kShadows), o.shadows);
+    if (shadows == std::end(kShadows)) {
+        const std::string_view near = nearest_word(o.shadows, kShadows);
+        return usage("--shadows " + o.shadows + ": there are no such shadows; " +
+                     (near.empty() ? "use rays or cascades" : "did you mean " + std::string(near) + "?"));
+    }
+    s.mesh_shadows = MeshShadows(shadows - std::begin(kShadows));
+    const auto lighting = std::find(std::begin(kLightings), std::end(kLightings), o.lighting);
+    if (lighting == std::end(kLightings)) {
+        const std::string_view near = nearest_word(o.lighting, kLightings);
+        return usage("--lighting " + o.lighting + ": there is no such lighting; " +
+                     (near.empty() ? "use clusters or volumes" : "did you mean " + std::string(near) + "?"));
+    }
+    s.lighting = LightTechnique(lighting - std::begin(kLightings));
+    if (!(o.scale >= 0.25f && o.scale <= 1)) return usage("--scale wants a number from 0.25 to 1");
+    if (o.scale < 1 && !o.taa && o.quality != "ultra")
+        return usage("--scale works with --taa, or with --quality ultra; add one of them");
+    s.scale = o.scale;
     if (!o.quality.empty()) {
         const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality);
         if (found == std::end(kQualities)) {
@@ -94,6 +113,9 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     s.atlas_by_copy = o.atlas_by_copy;
     return s;
 }
+
+// With --taa, a round of the places in its pixels that the renderer looks through.
+int pictures_of_one_view(const RenderSettings& s) { return int(std::ceil(16 / (s.scale * s.scale) - 1e-3f)); }
 
 std::string_view choose_quality(const PictureOptions& o, const Renderer& renderer, RenderSettings& s) {
     if (o.quality.empty()) return kQualities[size_t(Quality::High)];
@@ -201,8 +223,13 @@ std::string report(const PictureOptions& o, std::string_view quality, const Rend
             .number("triangles_drawn", double(stats.triangles_drawn))
             .number("triangles_culled", double(stats.triangles - std::min(stats.triangles, stats.triangles_drawn)))
             .raw("mesh_clusters", clusters_json(stats));
-    json.text("march_tier", stats.march_tier);
-    if (stats.triangles > 0) json.text("mesh_tier", stats.mesh_tier);
+    json.text("march_tier", stats.march_tier).text("lighting", stats.lighting);
+    if (s.scale < 1)
+        json.raw("rays", "[" + std::to_string(stats.rays_across) + ", " + std::to_string(stats.rays_down) + "]");
+    if (stats.triangles > 0) {
+        json.text("mesh_tier", stats.mesh_tier).text("mesh_shadows", stats.mesh_shadows);
+        json.number("cascades", stats.cascades);
+    }
     if (stats.boxes > 0)
         json.number("boxes", stats.boxes)
             .number("box_tree_builds", double(stats.box_tree_builds))
@@ -336,7 +363,7 @@ int render_picture(const PictureOptions& o) {
         quality = choose_quality(o, *renderer, *settings);
         progress.stage("drawing");
         picture = renderer->render(*frame, *settings);
-        for (int i = 1; picture && settings->taa && i < kPicturesOfOneView; ++i)
+        for (int i = 1; picture && settings->taa && i < pictures_of_one_view(*settings); ++i)
             picture = renderer->render(*frame, *settings);
         stats = renderer->stats();
     }

@@ -21,7 +21,10 @@ struct PictureOptions {
          atlas_by_copy = false, no_cull = false, outline_hulls = false;
     int transparent_layers = 4;
     bool taa = false;
-    std::string quality;  ///< low, medium, high, ultra or auto; empty: high
+    std::string quality;                ///< low, medium, high, ultra or auto; empty: high
+    std::string shadows = "rays";       ///< of meshes: rays or cascades
+    std::string lighting = "clusters";  ///< clusters or volumes
+    float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture
 };

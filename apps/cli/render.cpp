@@ -53,6 +53,16 @@ void add_render(CLI::App& app, Run& run) {
                    "anti-alias over time: by the pictures before with --path, else by sixteen of one view");
     verb->add_option("--quality", o->quality,
                      "low, medium (hard shadows), high (default), ultra (with --taa), or auto: what suits the device");
+    verb->add_option("--scale", o->scale,
+                     "with --taa: rays a pixel along each side, 0.25 to 1; the picture is made whole over time")
+        ->capture_default_str();
+    verb->add_option("--lighting", o->lighting,
+                     "of lamps and spots: clusters (lists by tile), or volumes (rasterised and added up): the same "
+                     "picture")
+        ->capture_default_str();
+    verb->add_option("--shadows", o->shadows,
+                     "of meshes under the sun: rays (exact), or cascades (shadow maps, cheaper where pixels are many)")
+        ->capture_default_str();
     verb->add_flag("--json", o->json, "one object with what it took, on stdout");
     verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
     verb->callback([o, &run] { run = [o] { return render_picture(*o); }; });

@@ -144,6 +144,14 @@ struct Frame {
 /// that was measured, which is Compute on every device so far.
 enum class Tier : uint8_t { Auto, Compute, Rt, Mesh };
 
+/// Who finds what meshes hide of a sun. Rays: exact, whatever the light. Cascades: shadow maps for the first directional light, snapped to texels,
+/// with half shadows of the right width; other lights keep their rays.
+enum class MeshShadows : uint8_t { Rays, Cascades };
+
+/// How point and spot lights reach the picture. Clusters: lists by tile, walked by a compute pass. Volumes: each light's ball or cone is rasterised and
+/// added by blending, as deferred renderers began; the same picture to the rounding of half floats.
+enum class LightTechnique : uint8_t { Clusters, Volumes };
+
 struct RenderSettings {
     int width = 1280, height = 720;  ///< pixels, 1 to 16384
     View view = View::Shaded;
@@ -164,6 +172,11 @@ struct RenderSettings {
         4;  ///< things of glass and panes that a ray may go through, [0, 16]; those behind are not seen
     bool outline_hulls = false;  ///< meshes are outlined by their back faces made larger, for comparison
     bool cull_meshes = true;     ///< false: triangles that something hides are drawn too, and rays go on behind meshes
+    MeshShadows mesh_shadows = MeshShadows::Rays;
+    LightTechnique lighting = LightTechnique::Clusters;
+    float scale =
+        1;  ///< below 1, with taa: rays a pixel along each side, [0.25, 1]; the picture is made whole over time
+    int shadow_map_side = 0;  ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
 };
 
 /// What a picture may cost. Low: hard shadows, surfaces as the bricks have them. Medium: hard shadows. High: everything that one picture can
@@ -222,8 +235,12 @@ struct RenderStats {
     /// Of each of `passes`: bytes of the frame's own images and buffers that it reads and writes, each texel once.
     std::vector<std::pair<std::string, uint64_t>> pass_bytes;
     std::vector<std::pair<std::string, uint64_t>> pass_evaluations;  ///< of those that march
-    uint64_t transient_peak_bytes = 0;  ///< memory of images that live for a part of a frame
-    uint64_t transient_sum_bytes = 0;   ///< … if they did not share it
+    uint64_t transient_peak_bytes = 0;   ///< memory of images that live for a part of a frame
+    uint64_t transient_sum_bytes = 0;    ///< … if they did not share it
+    std::string mesh_shadows = "rays";   ///< of the first directional light, where there are meshes: "rays", "cascades"
+    int cascades = 0;                    ///< shadow maps
+    int rays_across = 0, rays_down = 0;  ///< pixels that were marched and lit, before upscaling
+    std::string lighting = "clusters";   ///< of point and spot lights: "clusters", "volumes"
 };
 
 struct DeviceInfo {

@@ -3,10 +3,14 @@
 
 #include "base/format.h"
 #include "render/lib/pack.h"
+#include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
+#include "render/passes/light_volumes.h"
+#include "render/passes/upscale.h"
 
 #include <cmath>
+#include <tuple>
 
 namespace kiln::render {
 
@@ -18,8 +22,21 @@ bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::is
 
 }  // namespace
 
+std::pair<int, int> rays_of(const RenderSettings& settings) {
+    const auto of = [&](int pixels) {
+        return std::clamp(int(std::lround(double(settings.scale) * pixels)), 1, std::max(pixels, 1));
+    };
+    return {of(settings.width), of(settings.height)};
+}
+
+shade::CameraParams of_rays(shade::CameraParams camera, int across, int down) {
+    camera.right.w = 1 / float(across);
+    camera.up.w = 1 / float(down);
+    return camera;
+}
+
 Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& settings, const GpuField& field) {
-    const auto [width, height] = std::pair{settings.width, settings.height};
+    int width = settings.width, height = settings.height;
     if (width < 1 || height < 1 || width > kLargestSide || height > kLargestSide) {
         return Error{formatted("a picture of {} x {} pixels; each side is 1 to {}", width, height, kLargestSide),
                      ErrorKind::Usage};
@@ -46,6 +63,19 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
         return Error{formatted("a camera with bloom_threshold {}; it is at least 0", camera.bloom_threshold),
                      ErrorKind::Usage};
     }
+    if (!(settings.scale >= 0.25f && settings.scale <= 1))
+        return Error{formatted("scale {}; it is from 0.25 to 1", settings.scale), ErrorKind::Usage};
+    if (settings.scale < 1 && !(settings.taa && settings.view == View::Shaded))
+        return Error{"scale: a picture of fewer rays is made whole over time; ask for taa, on a shaded picture",
+                     ErrorKind::Usage};
+    if (settings.scale < 1 && settings.outline_hulls)
+        return Error{"scale: outlines by hulls are drawn at the size of the rays; leave one of them out",
+                     ErrorKind::Usage};
+    const int texels = settings.shadow_map_side;
+    if (texels != 0 && (texels < 64 || texels > 8192 || (texels & (texels - 1)) != 0)) {
+        return Error{formatted("shadow_map_side {}; it is 0, or a power of two from 64 to 8192", texels),
+                     ErrorKind::Usage};
+    }
     if (!(settings.elapsed >= 0))
         return Error{formatted("elapsed {} s; it is at least 0", settings.elapsed), ErrorKind::Usage};
     const vec3 look = camera.target - camera.position;
@@ -69,6 +99,10 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.distance_scale = field.distance_scale();
 
     p.camera = shade::camera_params(camera, width, height);
+    if (settings.scale < 1) {
+        std::tie(width, height) = rays_of(settings);
+        p.camera = of_rays(p.camera, width, height);
+    }
     p.pixel_angle = 2.0f * length({p.camera.up.x, p.camera.up.y, p.camera.up.z}) / float(height);
 
     p.width = p.tile_width = width;
@@ -126,7 +160,11 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
         Front front = draw_through(g, in, surface, radiance);
         Image moved = in.taa ? motion(g, in, front.surface.seen) : radiance;  // not read without
         draw_particles(g, in, surface.depth, front, radiance, moved);
-        if (in.taa) radiance = taa(g, in, radiance, front.surface.depth, moved);
+        if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.surface.depth, moved);
+        if (in.upscales) {
+            radiance = taa_up(g, in, radiance, front.surface.depth, moved);
+            surface.depth = upscale_depth(g, in, surface.depth);
+        }
         out.radiance = g.readback(radiance);
         if (in.develops) {
             Buffer exposure = in.exposure;
@@ -215,11 +253,15 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     }
     out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
-    if (in.has_meshes) out.push_back(&mesh_shadow_kernel(in));
-    out.push_back(&light_kernel(in));
+    if (in.has_cascades) out.insert(out.end(), {&kCascadeCull, &kShadowCascades});
+    if (in.has_meshes && !in.cascades_alone) out.push_back(&mesh_shadow_kernel(in));
+    if (in.volume_count > 0) out.push_back(&light_over_kernel(in));
+    if (in.volume_count == 0 || in.has_glass || in.has_blends) out.push_back(&light_kernel(in));
     through_kernels(in, out);
-    if (in.has_particles) out.insert(out.end(), {&kParticles, in.image_sky ? &kParticlesLightImage : &kParticlesLight});
-    if (in.taa) out.insert(out.end(), {&kMotion, &kTaa});
+    if (in.has_particles)
+        out.insert(out.end(), {&kParticles, &kParticlesStart, in.image_sky ? &kParticlesLightImage : &kParticlesLight});
+    if (in.taa) out.insert(out.end(), {&kMotion, in.upscales ? &kTaaUp : &kTaa});
+    if (in.upscales) out.push_back(&kUpDepth);
     if (in.taa && in.moved.owners.count > 0) out.push_back(&specialised(kOutlineMask, in.moved.owners.use));
     if (!in.develops) return out;
     if (in.camera.auto_exposure) out.insert(out.end(), {&kExposureCount, &kExposureAdapt});
@@ -230,6 +272,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.outline_count > 0) out.push_back(&specialised(kOutlineMask, in.use_of_outlines));
     if (in.outline_count > 0 || in.outlines_meshes) out.insert(out.end(), {&kOutlineFlood, &kOutlineDraw});
     if (in.outlines_meshes || in.outline_hulls) out.push_back(&kOutlineMeshes);
+    if (in.upscales && (in.outline_count > 0 || in.outlines_meshes)) out.push_back(&kUpOwners);
     if (in.has_lines || in.outline_hulls) out.push_back(&kLinesOver);
     return out;
 }
@@ -240,6 +283,9 @@ std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
     if (in.has_meshes && !in.mesh_shader) out = {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
     if (in.has_lines) out.push_back(&kLines);
     if (in.outline_hulls) out.push_back(&kOutlineHull);
+    if (in.volume_count > 0) out.push_back(&light_volume_kernel(in));
+    if (in.has_cascades) out.push_back(&kCascade);
+    if (in.has_cascades && in.mesh_holes) out.push_back(&kCascadeMask);
     return out;
 }
 

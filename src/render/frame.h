@@ -6,7 +6,14 @@
 
 #include <kiln/renderer.h>
 
+#include <utility>
+
 namespace kiln::render {
+
+// Rays across and down: fewer than pixels where settings.scale is below 1.
+std::pair<int, int> rays_of(const RenderSettings& settings);
+// The camera with so many.
+shade::CameraParams of_rays(shade::CameraParams camera, int across, int down);
 
 // Parameters of a frame from what its user asked for; the tile's fields are the whole picture.
 // Errors (kind Usage) for sizes and cameras that make no picture.

@@ -295,6 +295,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
     clusters_.clear();
     blends_.clear();
     outlined_.clear();
+    casters_.clear();
     one_sided_ = double_sided_ = masked_ = 0;
     triangles_ = triangles_in_sight_ = 0;
     holes_ = false;
@@ -356,6 +357,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
         const Primitive& p = set.primitive(part);
         if (const uint32_t n = outline_of[part.mesh]; n > 0) boxes[n - 1] = box_union(boxes[n - 1], part.bounds);
         const Model& at = places_[part.model];
+        casters_.push_back({part.place, part.bounds, p.index_count / 3, false});
         Matrix place = part.place, before = part.before;
         for (Matrix* m : {&place, &before}) (*m)[12] -= eye.x, (*m)[13] -= eye.y, (*m)[14] -= eye.z;
         const Matrix back = model::inverse(place);
@@ -374,6 +376,7 @@ Result<void> GpuMeshes::update(const Frame& frame, const shade::CameraParams& ca
                           moved ? next_moved_box : at.first_boxes[part.primitive], 0, 0});
         if (moved) next_moved_box += clusters_of(p);
         holes_ = holes_ || holes;
+        casters_.back().holes = holes;
         if (surface.blend) {
             const auto from_eye = [&](vec3 v) {
                 return vec3{float(double(v.x) - eye.x), float(double(v.y) - eye.y), float(double(v.z) - eye.z)};

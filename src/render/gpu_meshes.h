@@ -21,6 +21,14 @@ struct MeshOutline {
     uint32_t first_cluster = 0, clusters = 0;
 };
 
+// A part that shadows: all of them, in the order of MeshHandles::parts.
+struct MeshCaster {
+    model::Matrix place{};  // world from local
+    Box3 bounds;            // world
+    uint32_t triangles = 0;
+    bool holes = false;
+};
+
 // A frame's meshes as resources of a graph.
 struct MeshHandles {
     Buffer clusters;  // MeshClusterRef: one-sided parts first, then double-sided ones, then those with holes
@@ -51,6 +59,7 @@ public:
     // Of parts that blend, metres from the eye.
     const std::vector<Box3>& blends() const { return blends_; }
     const std::vector<MeshOutline>& outlined() const { return outlined_; }
+    const std::vector<MeshCaster>& casters() const { return casters_; }
     uint64_t triangles() const { return triangles_; }
     // Of parts in sight: what is drawn where nothing hidden is left out.
     uint64_t triangles_in_sight() const { return triangles_in_sight_; }
@@ -83,6 +92,7 @@ private:
     bool holes_ = false;
     std::vector<Box3> blends_;
     std::vector<MeshOutline> outlined_;
+    std::vector<MeshCaster> casters_;
     uint64_t triangles_ = 0, triangles_in_sight_ = 0;
 };
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "render/particle_bins.h"
 
+#include "render/passes/cluster.gpu.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -127,6 +129,38 @@ ParticleBins particle_bins(std::span<const Particle> particles, const shade::Cam
     out.numbers.resize(sum);
     for (uint32_t i = 0; i < places.size(); ++i)
         each_bin(places[i], [&](uint32_t bin) { out.numbers[out.ends[bin]++] = i; });
+    return out;
+}
+
+ParticleSun particle_sun(std::span<const ParticleRecord> records, const FrameParams& frame, uint32_t light) {
+    ParticleSun out{frame, {}, {}};
+    FrameParams& p = out.frame;
+    const int across = int(std::ceil(std::sqrt(double(std::max<size_t>(records.size(), 1)))));
+    const int down = (int(records.size()) + across - 1) / across;
+    p.tile_x = p.tile_y = 0;
+    p.tile_width = p.width = across;
+    p.tile_height = p.height = std::max(down, 1);
+    p.flags |= kFrameRays;
+    const double h = double(frame.grid.voxel_size);
+    const double eye[3] = {frame.eye_x + double(frame.eye_part_x), frame.eye_y + double(frame.eye_part_y),
+                           frame.eye_z + double(frame.eye_part_z)};
+    out.rays.resize(size_t(p.tile_width) * size_t(p.tile_height), FrameRay{});
+    for (size_t i = 0; i < records.size(); ++i) {
+        const double at[3] = {eye[0] + double(records[i].x) / h, eye[1] + double(records[i].y) / h,
+                              eye[2] + double(records[i].z) / h};
+        int whole[3];
+        float part[3];
+        for (int k = 0; k < 3; ++k) {
+            const double floor = std::floor(std::clamp(at[k], -2e9, 2e9));
+            whole[k] = int(floor);
+            part[k] = float(std::clamp(at[k], -2e9, 2e9) - floor);
+        }
+        out.rays[i] = {whole[0], whole[1], whole[2], 0, part[0], part[1], part[2], 0, 0, 1, 0, 0};
+    }
+    const auto tiles = [](int pixels) { return size_t((pixels + kClusterSide - 1) / kClusterSide); };
+    const size_t words = (frame.light_count + 31) / 32;
+    out.masks.resize(tiles(p.tile_width) * tiles(p.tile_height) * words);
+    for (size_t word = light / 32; word < out.masks.size(); word += words) out.masks[word] = 1u << (light % 32);
     return out;
 }
 

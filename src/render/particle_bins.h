@@ -25,4 +25,12 @@ struct ParticleBins {
 ParticleBins particle_bins(std::span<const Particle> particles, const shade::CameraParams& camera, int left, int top,
                            int width, int height);
 
+// The picture that passes of shadows look at for particles: a pixel each, row after row; `light` alone in every tile's list.
+struct ParticleSun {
+    FrameParams frame;
+    std::vector<FrameRay> rays;   // from their middles
+    std::vector<uint32_t> masks;  // as cluster.comp writes
+};
+ParticleSun particle_sun(std::span<const ParticleRecord> records, const FrameParams& frame, uint32_t light);
+
 }  // namespace kiln::render

@@ -16,6 +16,7 @@
 #include "render/lib/environment_map.h"
 #include "render/lib/ggx_table.h"
 #include "render/lib/pack.h"
+#include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/particle_bins.h"
 #include "render/passes/instances.h"
@@ -67,6 +68,7 @@ struct Renderer::Impl {
     };
     std::optional<Before> before;
     uint64_t taa_frame = 0;
+    vec2 jitter{};                  // of the frame
     OutlineCode outlined;           // of the frame
     MovedEdits moved;               // likewise, with taa
     std::vector<LineRecord> lines;  // likewise
@@ -123,6 +125,10 @@ struct Renderer::Impl {
         in.taa = settings.taa && settings.view == View::Shaded;
         in.has_history = before && !settings.cut && before->width == settings.width &&
                          before->height == settings.height && follows(frame.camera, before->camera);
+        in.upscales = in.taa && settings.scale < 1;
+        in.jitter = jitter;
+        if (settings.lighting == LightTechnique::Volumes && settings.view == View::Shaded)
+            in.volume_count = uint32_t(std::count_if(frame.lights.begin(), frame.lights.end(), is_somewhere));
         in.outline_count = uint32_t(outlined.records.size());
         in.widest_outline = outlined.widest;
         in.use_of_outlines = refines_on_host() ? tape_use(outlined.code) : any_kind(tape_use(outlined.code));
@@ -139,6 +145,7 @@ struct Renderer::Impl {
         in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
         in.moved.has_boxes = !moved.boxes.empty();
         in.mesh_holes = meshes->holes();
+        choose_cascades(frame, settings, in);
         in.transparent_layers = settings.view == View::Shaded ? std::clamp(settings.transparent_layers, 0, 16) : 0;
         in.has_glass = in.transparent_layers > 0 &&
                        std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) {
@@ -156,12 +163,25 @@ struct Renderer::Impl {
     bool culls_meshes(const RenderSettings& settings) const {
         return settings.cull_meshes && settings.accelerate && meshes->clusters_in_sight() > 0;
     }
+    static bool is_somewhere(const Light& light) { return light.kind != Light::Kind::Directional; }
+    // Maps are for the first sun.
+    void choose_cascades(const Frame& frame, const RenderSettings& settings, TileInputs& in) const {
+        const auto is_sun = [](const Light& l) { return l.kind == Light::Kind::Directional; };
+        const auto sun = std::find_if(frame.lights.begin(), frame.lights.end(), is_sun);
+        in.has_cascades = in.has_meshes && settings.mesh_shadows == MeshShadows::Cascades &&
+                          settings.view == View::Shaded && sun != frame.lights.end();
+        in.mapped_light = uint32_t(sun - frame.lights.begin());
+        in.cascades_alone = in.has_cascades && frame.lights.size() == 1;
+    }
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
     static bool traces(const Frame& frame, const RenderSettings& settings) {
         return settings.tier == Tier::Rt && !settings.analytic && frame.field && frame.instances.empty();
     }
     // Has the device what this tier needs?
     Result<void> check_tier(Tier tier) const;
+    // What the passes of shadows want to know of the sun on particles.
+    static void shade_particles(Graph& g, const Frame& frame, const FrameParams& params, const ParticleBins& bins,
+                                ParticleHandles& out);
     // The parts of a tile behind which something lets light through.
     void find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const;
     void add_times(const FrameTimes& times);
@@ -259,6 +279,19 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
     in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
 }
 
+void Renderer::Impl::shade_particles(Graph& g, const Frame& frame, const FrameParams& params, const ParticleBins& bins,
+                                     ParticleHandles& out) {
+    const auto is_sun = [](const Light& l) { return !is_somewhere(l); };
+    const auto sun = std::find_if(frame.lights.begin(), frame.lights.end(), is_sun);
+    if (sun == frame.lights.end()) return;
+    out.sun = uint32_t(sun - frame.lights.begin());
+    ParticleSun picture = particle_sun(bins.records, params, out.sun);
+    out.size = {uint32_t(picture.frame.tile_width), uint32_t(picture.frame.tile_height)};
+    out.frame = g.block(picture.frame);
+    out.rays = g.upload("rays of particles", std::span<const FrameRay>(picture.rays));
+    out.masks = g.upload("lights of particles", std::span<const uint32_t>(picture.masks));
+}
+
 Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSettings& settings, const FrameParams& params,
                                          Picture& picture) {
     const auto inputs_on = [&](Graph& g) {
@@ -289,7 +322,14 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         const uint32_t nothing[4] = {};
         in.environment = in.image_sky ? g.import("environment", environment)
                                       : g.upload("no environment", std::span<const uint32_t>(nothing));
-        in.size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+        in.size = in.shown_size = {uint32_t(params.tile_width), uint32_t(params.tile_height)};
+        if (in.upscales) in.shown_size = {uint32_t(settings.width), uint32_t(settings.height)};
+        if (in.volume_count > 0) {
+            std::vector<uint32_t> numbers;
+            for (uint32_t i = 0; i < frame.lights.size(); ++i)
+                if (is_somewhere(frame.lights[i])) numbers.push_back(i);
+            in.volumes = g.upload("lights with volumes", std::span<const uint32_t>(numbers));
+        }
         in.exposure = g.import("exposure", exposure);
         if (in.outline_count > 0 || in.outlines_meshes) {
             std::vector<OutlineRecord> records = outlined.records;
@@ -315,7 +355,9 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         }
         if (in.taa || in.has_particles) {
             MotionParams motion = motion_params(frame.camera, in.has_history ? before->camera : frame.camera,
-                                                params.width, params.height);
+                                                settings.width, settings.height);
+            motion.now = of_rays(motion.now, params.width, params.height);
+            motion.before = of_rays(motion.before, params.width, params.height);
             motion.moved_count = in.moved.owners.count;
             motion.changed_count = uint32_t(moved.boxes.size());
             in.motion = g.block(motion);
@@ -329,6 +371,18 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                 in.moved.boxes = g.upload("changed boxes", std::span<const ChangedBox>(moved.boxes));
         }
         in.meshes = meshes->import(g);
+        if (in.has_cascades) {
+            const int side =
+                settings.shadow_map_side > 0 ? settings.shadow_map_side : shadow_map_side(params.width, params.height);
+            std::vector<Box3> boxes_of_casters;
+            for (const MeshCaster& caster : meshes->casters()) boxes_of_casters.push_back(caster.bounds);
+            const ShadowCascades fitted = fit_cascades(boxes_of_casters, frame.lights[in.mapped_light].direction,
+                                                       frame.camera, double(params.width) / params.height, side);
+            in.cascades = draw_cascades(g, in.meshes, fitted, caster_lists(meshes->casters(), fitted),
+                                        frame.camera.position, in.mapped_light);
+            stats.mesh_shadows = "cascades";
+            stats.cascades = int(fitted.squares.size());
+        }
         if (in.rt) in.boxes = boxes->import(g);
         find_through(g, frame, params, in);
         if (in.has_particles) {
@@ -341,19 +395,20 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                 in.particles.records = g.upload("particles", std::span<const ParticleRecord>(bins.records));
                 in.particles.ends = g.upload("particle bins", std::span<const uint32_t>(bins.ends));
                 in.particles.numbers = g.upload("particle numbers", std::span<const uint32_t>(bins.numbers));
+                shade_particles(g, frame, params, bins, in.particles);
             }
         }
         if (in.has_lines) {
             in.lines.count = uint32_t(lines.size());
             in.lines.lines = g.upload("debug lines", std::span<const LineRecord>(lines));
             in.lines.params =
-                g.block(LineParams{.camera = shade::camera_params(frame.camera, params.width, params.height),
-                                   .width = params.width,
-                                   .height = params.height,
+                g.block(LineParams{.camera = shade::camera_params(frame.camera, settings.width, settings.height),
+                                   .width = settings.width,
+                                   .height = settings.height,
                                    .tile_x = params.tile_x,
                                    .tile_y = params.tile_y,
-                                   .tile_width = params.tile_width,
-                                   .tile_height = params.tile_height,
+                                   .tile_width = int(in.shown_size.width),
+                                   .tile_height = int(in.shown_size.height),
                                    .pad_0 = 0,
                                    .pad_1 = 0});
         }
@@ -433,7 +488,8 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     }
     auto depth = tile.depth.get_as<float>();
     if (!depth) return depth.error();
-    place_tile(picture, params.tile_x, params.tile_y, params.tile_width, params.tile_height, *radiance, shown, *depth);
+    place_tile(picture, params.tile_x, params.tile_y, int(in.shown_size.width), int(in.shown_size.height), *radiance,
+               shown, *depth);
     return {};
 }
 
@@ -541,7 +597,8 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                       settings.width, settings.height),
             ErrorKind::Usage};
     if (settings.cut) taa_frame = 0;
-    if (taa && settings.taa_jitter) params->camera = jittered(params->camera, jitter_of(taa_frame));
+    jitter = taa && settings.taa_jitter ? jitter_of(taa_frame, jitter_round(settings.scale)) : vec2{};
+    if (taa && settings.taa_jitter) params->camera = jittered(params->camera, jitter);
     if (auto brought = bring(frame); !brought) return brought.error();
     if (field->bake_ms() > 0) {
         stats.frame_ms = field->bake_ms();
@@ -561,17 +618,18 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     picture.rgba.resize(pixels * 4);
     picture.srgb.resize(pixels * 4);
     picture.depth.resize(pixels);
-    const auto [tile_width, tile_height] = tile_size(settings, frame.lights.size());
+    const auto [tile_width, tile_height] = tile_size(settings, frame.lights.size());  // with taa one, of all rays
+    const auto [across, down] = rays_of(settings);
     if (!frame.camera.auto_exposure) eye = measured_exposure({}, frame.camera, 0, {});
     if (auto written = device->write_buffer(exposure, 0, std::as_bytes(std::span(&eye, 1))); !written)
         return written.error();
-    for (int y = 0; y < settings.height; y += tile_height) {
-        for (int x = 0; x < settings.width; x += tile_width) {
+    for (int y = 0; y < down; y += tile_height) {
+        for (int x = 0; x < across; x += tile_width) {
             FrameParams tile = *params;
             tile.tile_x = x;
             tile.tile_y = y;
-            tile.tile_width = std::min(tile_width, settings.width - x);
-            tile.tile_height = std::min(tile_height, settings.height - y);
+            tile.tile_width = std::min(tile_width, across - x);
+            tile.tile_height = std::min(tile_height, down - y);
             if (auto done = render_tile(frame, settings, tile, picture); !done) return done.error();
         }
     }
@@ -600,6 +658,9 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     stats.atlas_bytes = field->atlas_bytes();
     stats.pipelines_created = runner->pipelines().made();
     stats.coarsened = frame.coarsened;
+    stats.rays_across = across;
+    stats.rays_down = down;
+    if (switches.volume_count > 0) stats.lighting = "volumes";
     stats.march_tier = switches.rt ? "rt" : "compute";
     stats.mesh_tier = switches.mesh_shader ? "mesh" : "vertex";
     if (boxes) {

@@ -3,6 +3,8 @@
 
 #include "render/lib/pack.h"
 
+#include <cmath>
+
 namespace kiln::render {
 
 namespace {
@@ -16,8 +18,10 @@ float mirrored(uint32_t n, uint32_t base) {
 
 }  // namespace
 
-vec2 jitter_of(uint64_t frame) {
-    const uint32_t n = uint32_t(frame % kJitterRound) + 1;
+uint32_t jitter_round(float scale) { return uint32_t(std::ceil(float(kJitterRound) / (scale * scale) - 1e-3f)); }
+
+vec2 jitter_of(uint64_t frame, uint32_t round) {
+    const uint32_t n = uint32_t(frame % round) + 1;
     return {mirrored(n, 2) - 0.5f, mirrored(n, 3) - 0.5f};
 }
 

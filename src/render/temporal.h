@@ -13,7 +13,9 @@ namespace kiln::render {
 inline constexpr uint32_t kJitterRound = 16;  // frames until the places repeat
 
 // Offset from a pixel's middle, pixels, [-1/2, 1/2): Halton's points of bases 2 and 3 (Halton, 1964).
-vec2 jitter_of(uint64_t frame);
+vec2 jitter_of(uint64_t frame, uint32_t round = kJitterRound);
+// As many places for a shown pixel where rays are fewer: `scale` of them along each side.
+uint32_t jitter_round(float scale);
 // The camera whose rays pass there.
 shade::CameraParams jittered(shade::CameraParams camera, vec2 offset_px);
 

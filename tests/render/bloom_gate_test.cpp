@@ -23,7 +23,8 @@ Picture picture_of(int width, int height, const std::function<vec3(double, doubl
         for (int x = 0; x < width; ++x) {
             vec3 sum{};
             for (int k = 0; k < kAcross * kAcross; ++k)
-                sum = sum + light((x + (k % kAcross + 0.5) / kAcross) / height, (y + (k / kAcross + 0.5) / kAcross) / height);
+                sum = sum +
+                      light((x + (k % kAcross + 0.5) / kAcross) / height, (y + (k / kAcross + 0.5) / kAcross) / height);
             sum = sum * (1.0f / (kAcross * kAcross));
             float* const to = &p.rgba[(size_t(y) * size_t(width) + size_t(x)) * 4];
             to[0] = sum.x, to[1] = sum.y, to[2] = sum.z;
@@ -93,7 +94,8 @@ TEST(BloomGate, ASparkThatMovesByPartsOfAPixelDoesNotFlicker) {
 TEST(BloomGate, APictureAtTwiceTheResolutionShowsTheSameGlow) {
     const auto room = [](double x, double y) {
         vec3 out{0.05f + 0.05f * float(y), 0.06f, 0.08f};
-        constexpr double kLamps[][4] = {{0.4, 0.3, 0.05, 12}, {1.2, 0.6, 0.02, 60}, {0.9, 0.25, 0.008, 200}, {1.5, 0.8, 0.1, 4}};
+        constexpr double kLamps[][4] = {
+            {0.4, 0.3, 0.05, 12}, {1.2, 0.6, 0.02, 60}, {0.9, 0.25, 0.008, 200}, {1.5, 0.8, 0.1, 4}};
         for (const auto& [u, v, radius, light] : kLamps)
             if (std::hypot(x - u, y - v) < radius) out = out + vec3{1, 0.8f, 0.6f} * float(light);
         return out;
@@ -114,7 +116,8 @@ TEST(BloomGate, APictureAtTwiceTheResolutionShowsTheSameGlow) {
                     a.values.push_back(float(one.srgb[(size_t(y) * size_t(one.width) + size_t(x)) * 4 + c]) / 255);
                     float sum = 0;
                     for (int k = 0; k < 4; ++k)
-                        sum += float(two.srgb[(size_t(2 * y + k / 2) * size_t(two.width) + size_t(2 * x + k % 2)) * 4 + c]);
+                        sum += float(
+                            two.srgb[(size_t(2 * y + k / 2) * size_t(two.width) + size_t(2 * x + k % 2)) * 4 + c]);
                     b.values.push_back(sum / (4 * 255));
                 }
             }

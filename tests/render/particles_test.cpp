@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Particles: each pixel against all of them, one after another; bins that lose none; orders that change nothing.
+#include "drawables.h"
 #include "field/brick_set.h"
 #include "gpu_worlds.h"
 #include "render/lib/pack.h"
@@ -50,6 +51,13 @@ struct ParticlesGpu : testing::Test {
     Frame frame;
 };
 
+// How far from the ray towards the sun the world's origin is; far away where that ray begins past it.
+float from_axis(const Light& sun, vec3 p) {
+    const vec3 l = normalize(sun.direction) * -1.0f;
+    const float along = -dot(p, l);
+    return along < 0 ? 1e9f : length(p + l * along);
+}
+
 // What the kernel claims, without bins, in double precision.
 vec3 over(const Frame& frame, const Picture& bare, int x, int y) {
     const size_t at = size_t(y * kWidth + x);
@@ -71,9 +79,11 @@ vec3 over(const Frame& frame, const Picture& bare, int x, int y) {
         const double seen = std::clamp((double(bare.depth[at]) - along + half_way) / (2 * half_way), 0.0, 1.0);
         const double covers = double(p->opacity) * inside * inside * seen;
         vec3 light = frame.environment->color;
-        for (const Light& l : frame.lights)
+        for (const Light& l : frame.lights) {
+            if (l.kind == Light::Kind::Directional && from_axis(l, p->position) < 0.5f) continue;  // behind the ball
             light =
                 light + shade::sample_light(shade::light_record(l), p->position).illuminance * (0.25f / 3.14159265f);
+        }
         const vec3 c = p->color * light + p->emissive;
         const double color[3] = {c.x, c.y, c.z};
         for (size_t k = 0; k < 3; ++k) sum[k] += left * covers * color[k];
@@ -87,6 +97,14 @@ vec3 over(const Frame& frame, const Picture& bare, int x, int y) {
 TEST_F(ParticlesGpu, CoverWhatIsBehindThemFromNearToFar) {
     const Picture bare = picture();
     frame.particles = cloud(150, 3, 0.8f);
+    // None whose middle sees a part of the sun, or is as near to the ball as rays begin off it.
+    const Light sun = frame.lights[0];
+    std::erase_if(frame.particles, [&](const Particle& q) {
+        return std::fabs(from_axis(sun, q.position) - 0.5f) < 0.08f || std::fabs(length(q.position) - 0.5f) < 0.1f;
+    });
+    int dark = 0;
+    for (const Particle& q : frame.particles) dark += from_axis(sun, q.position) < 0.5f;
+    EXPECT_GT(dark, 1);
     const Picture p = picture();
     double worst = 0, changed = 0;
     for (int y = 0; y < kHeight; ++y) {
@@ -101,6 +119,42 @@ TEST_F(ParticlesGpu, CoverWhatIsBehindThemFromNearToFar) {
     }
     EXPECT_LT(worst, 0.004);  // what is left of light is not followed below a thousandth
     EXPECT_GT(changed, 0.5 * kWidth * kHeight);
+}
+
+// Of the first sun: by the field, by instances, by meshes with rays and with maps.
+TEST_F(ParticlesGpu, LieInTheShadowOfWhatIsSolid) {
+    frame.camera.position = {0, 0.5f, 6};
+    frame.lights = {Light{.direction = {0, -1, 0}, .illuminance = 3}};
+    frame.environment = Environment{.color = {0, 0, 0}};
+    const auto puff = [&](vec3 at) {
+        Particle p;
+        p.position = p.before = at;
+        p.radius = 0.2f;
+        p.opacity = 1;
+        return p;
+    };
+    // Beside the ball, and under it.
+    frame.particles = {puff({-1.2f, -1, 0}), puff({0, -1, 0})};
+    const auto brightness = [&](const Picture& p, vec3 at) {
+        const shade::CameraParams eye = shade::camera_params(frame.camera, kWidth, kHeight);
+        const vec2 px = shade::camera_pixel(eye, at - frame.camera.position);
+        return p.rgba[size_t(int(px.y) * kWidth + int(px.x)) * 4];
+    };
+    const Picture by_field = picture();
+    EXPECT_GT(brightness(by_field, {-1.2f, -1, 0}), 0.1f);
+    EXPECT_LT(brightness(by_field, {0, -1, 0}), 0.001f);
+    frame.meshes = {meshes::at(meshes::sphere(0.4f, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {-1.2f, 0.2f, 0})};
+    for (const MeshShadows shadows : {MeshShadows::Rays, MeshShadows::Cascades}) {
+        const Picture p =
+            rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .mesh_shadows = shadows}));
+        EXPECT_LT(brightness(p, {-1.2f, -1, 0}), 0.001f) << int(shadows);
+    }
+    frame.meshes.clear();
+    Instance instance;
+    instance.bricks = rhi::must(field::BrickSet::make(field::worlds::compiled({edit(Sphere{0.4f})}), 0.05f));
+    instance.pose.position = instance.before.position = {-1.2f, 0.2f, 0};
+    frame.instances = {instance};
+    EXPECT_LT(brightness(picture(), {-1.2f, -1, 0}), 0.001f);
 }
 
 TEST_F(ParticlesGpu, TheirOrderInTheListChangesNoByte) {

@@ -9,8 +9,8 @@ namespace kiln::render {
 extern const RasterKernel kLines, kOutlineHull;
 extern const Kernel kLinesOver, kOutlineMeshes;
 extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend,
-    kThroughEnd, kThroughFront, kMeshTrace, kShadowGlass;
-extern const Kernel kParticles, kParticlesLight, kParticlesLightImage;
+    kThroughEnd, kThroughFront, kThroughMirror, kThroughMirrored, kThroughMirroredImage, kMeshTrace, kShadowGlass;
+extern const Kernel kParticles, kParticlesStart, kParticlesLight, kParticlesLightImage;
 
 // What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.
 struct Front {
@@ -34,7 +34,7 @@ void mark_meshes(Graph& g, const TileInputs& in, const Image& visibility, uint32
 // The finished picture with outlines of meshes by a stencil and larger hulls; see outline_hull.vert.
 Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const Image& shown);
 // The finished picture with something over it: colour times share, and share.
-Image lay_over(Graph& g, const TileInputs& in, const Image& drawn, const Image& shown);
+Image lay_over(Graph& g, const Image& drawn, const Image& shown);
 
 // As kernels see them, counted from the eye; those that are not finite are left out.
 std::vector<LineRecord> line_records(std::span<const DebugLine> lines, vec3 eye);

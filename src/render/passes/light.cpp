@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
+#include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
+#include "render/passes/light_volumes.h"
 #include "render/passes/passes.h"
 
 #include "shaders/light.spv.h"
@@ -30,20 +32,33 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
         g.create_buffer("light sums", batches ? uint64_t{in.size.width} * in.size.height * 3 * sizeof(float) : 16);
     g.clear(sums);
     Image radiance = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    Image of_volumes;
+    if (in.volume_count > 0)
+        of_volumes = g.create("light of volumes", {.size = in.size, .format = rhi::Format::Rgba16Float});
     uint32_t first = 0;
     do {
         const uint32_t next = first + kLightsAtOnce;
-        const ShadowPush push{.first_light = first, .more = next < in.lights_of_tile ? 1u : 0u, .pad_0 = 0, .pad_1 = 0};
+        const ShadowPush push{.first_light = first,
+                              .more = next < in.lights_of_tile ? 1u : 0u,
+                              .mapped = in.has_cascades ? in.mapped_light + 1 : 0,
+                              .pad_0 = 0};
         Image fractions = shadow(g, in, visibility, surface, masks, push);
         shadow_instances(g, in, visibility, surface, masks, first, fractions);
-        if (in.has_meshes) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
+        // In a tile's list a light comes no later than in the frame's.
+        if (in.has_cascades && first <= in.mapped_light)
+            fractions = shadow_by_cascades(g, in, surface, masks, fractions, push);
+        if (in.has_meshes && !in.cascades_alone) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
         std::vector<Image> tints;
         if (in.has_glass) tints = shadow_glass(g, in, visibility, surface, masks, first, fractions);
         std::vector<Use> uses{g.uniform(in.frame),    g.read(in.rays),    g.read(in.lights),     g.read(in.ggx_table),
                               g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions),
                               g.read(masks),          g.read_write(sums), g.write(radiance)};
         for (const Image& tint : tints) uses.push_back(g.read(tint));
-        g.dispatch(light_kernel(in), in.size, uses, push);
+        if (in.volume_count > 0) {
+            add_volumes(g, in, visibility, surface, fractions, masks, tints, push, of_volumes);
+            uses.push_back(g.read(of_volumes));
+        }
+        g.dispatch(in.volume_count > 0 ? light_over_kernel(in) : light_kernel(in), in.size, uses, push);
         first = next;
     } while (first < in.lights_of_tile);
     return radiance;

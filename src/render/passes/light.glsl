@@ -2,7 +2,8 @@
 // Light leaving each visible point towards the eye: what it emits and reflects of the sky, and of up to sixteen lights of its tile's
 // list; where nothing is, the sky. Later batches go on from the sums of the ones before, which are kept as they are: how a list is
 // cut into batches changes no bit.
-// With KILN_GLASS, light that comes through glass takes its colour. Kernels include frame.gpu.h first.
+// With KILN_GLASS, light that comes through glass takes its colour. With KILN_VOLUMES, lights that are somewhere were rasterised: their sum so far
+// is laid over what suns give. Kernels include frame.gpu.h first.
 
 #include "render/passes/shadow.gpu.h"
 
@@ -22,6 +23,9 @@ layout(set = 0, binding = 10, rgba16f) writeonly uniform image2D radiance;
 #ifdef KILN_GLASS
 layout(set = 0, binding = 11) uniform utexture2D tints_low;   // see shadow_glass.comp: of the first eight lights at hand
 layout(set = 0, binding = 12) uniform utexture2D tints_high;  // of the others
+#endif
+#ifdef KILN_VOLUMES
+layout(set = 0, binding = 13) uniform texture2D of_volumes;
 #endif
 layout(push_constant) uniform Push { ShadowPush push; };
 
@@ -84,6 +88,9 @@ void main() {
 #ifdef KILN_GLASS
         tint = unpack_tint(channel < 8u ? low : high, channel & 7u);
 #endif
+#ifdef KILN_VOLUMES
+        if (lights[index].kind != kLightDirectional) fraction = 0.0;
+#endif
         if (fraction > 0.0) sum += shade_light(view, sample_light(lights[index], p_world), fraction) * tint;
         index = next_light(walk);
     }
@@ -92,5 +99,8 @@ void main() {
         sums[kept + 1u] = sum.g;
         sums[kept + 2u] = sum.b;
     }
+#ifdef KILN_VOLUMES
+    sum += texelFetch(of_volumes, pixel, 0).rgb;
+#endif
     imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 1.0));
 }

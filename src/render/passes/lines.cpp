@@ -47,17 +47,17 @@ std::vector<LineRecord> line_records(std::span<const DebugLine> lines, vec3 eye)
 
 Image draw_lines(Graph& g, const TileInputs& in, const Image& depth, const Image& shown) {
     if (in.lines.count == 0) return shown;
-    Image drawn = g.create("debug lines", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    Image drawn = g.create("debug lines", {.size = shown.size, .format = rhi::Format::Rgba16Float});
     const DrawCall call{.vertices = 6, .instances = in.lines.count};
     g.draw(kLines, {.colors = {{.image = &drawn, .load = rhi::Load::Clear}}},
            {g.uniform(in.lines.params), g.read(in.lines.lines), g.read(depth)}, {&call, 1});
-    return lay_over(g, in, drawn, shown);
+    return lay_over(g, drawn, shown);
 }
 
-Image lay_over(Graph& g, const TileInputs& in, const Image& drawn, const Image& shown) {
-    Image out = g.create("shown with lines", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
-    g.dispatch(kLinesOver, in.size, {g.read(shown), g.read(drawn), g.write(out)},
-               LinePush{int(in.size.width), int(in.size.height)});
+Image lay_over(Graph& g, const Image& drawn, const Image& shown) {
+    Image out = g.create("shown with lines", {.size = shown.size, .format = rhi::Format::Rgba8Unorm});
+    g.dispatch(kLinesOver, shown.size, {g.read(shown), g.read(drawn), g.write(out)},
+               LinePush{int(shown.size.width), int(shown.size.height)});
     return out;
 }
 

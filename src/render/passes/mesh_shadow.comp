@@ -42,6 +42,7 @@ layout(constant_id = 7) const bool kHoles = true;
 #include "render/passes/rays.glsl"
 #include "render/passes/light_walk.glsl"
 #include "render/passes/surface.glsl"
+#include "render/passes/mesh_shadow_start.glsl"
 
 const float kFarMetres = 1e7;  // meshes are nearer; squares of it are floats
 
@@ -203,7 +204,6 @@ void cover(Shade shade, uint flags) {
 }
 
 // The triangle that the rays start on; none: kNoPart.
-const uint kNoPart = 0xffffffffu;
 uint own_part = kNoPart;
 uint own_triangle = 0u;
 
@@ -271,47 +271,18 @@ void main() {
     if (lit) {
         SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
         TexelRay ray = pixel_ray(pixel);
-        float h = frame.grid.voxel_size;
-        float t = uintBitsToFloat(seen.x) * h;
-        vec3 origin = ray_origin(ray);
-        from = origin + ray.direction * t;
-        // As far off the surface as floats of its place, and of bricks, may be wrong.
-        float off = 4e-6 * max(t, 0.1);
-        vec3 outwards = surface.normal;
-        if (state == kSeenMesh) {
-            MeshPart part = mesh_parts[seen.z];
-            own_part = seen.z;
-            own_triangle = seen.y & 0x0fffffffu;
-            vec3 p[3];
-            vec3 n[3];
-            for (uint i = 0u; i < 3u; ++i) {
-                uint v = mesh_corner(part, own_triangle, i);
-                p[i] = mesh_point(part, vertex_position(v));
-                n[i] = normalize(mesh_normal(part, unpack_unit(mesh_vertices[v].normal)));
-            }
-            vec3 w = mesh_weights_inside(p[0] - origin, p[1] - origin, p[2] - origin, ray.direction);
-            from = w.x * p[0] + w.y * p[1] + w.z * p[2];
-            outwards = cross(p[1] - p[0], p[2] - p[0]);
-            float size = length(outwards);
-            outwards = size > 0.0 ? outwards / size : surface.normal;
-            float side = dot(outwards, ray.direction) > 0.0 ? -1.0 : 1.0;
-            outwards *= side;
-            // Onto the round surface that the normals tell of, so that facets do not shadow it (Hanika, "Hacking the Shadow Terminator", 2021).
-            vec3 moved = vec3(0.0);
-            for (int i = 0; i < 3; ++i) moved -= w[i] * min(dot(from - p[i], side * n[i]), 0.0) * (side * n[i]);
-            from += moved;
-        } else {
-            off = max(off, 2e-3 * h);
-        }
-        from += outwards * off;
-        p_world = (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * h;
+        ShadowStart start = shadow_start(seen, ray, surface.normal);
+        from = start.from;
+        own_part = start.part;
+        own_triangle = start.triangle;
+        p_world = seen_point(ray, seen);
     }
     bound_tile(lit, from, fractions);
     LightWalk walk = light_walk(ivec2(gl_WorkGroupID.xy) * kTileGroup, push.first_light);
     for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
         uint index = next_light(walk);
         if (index == kNoLight) break;
-        if ((tile_wants & (1u << channel)) == 0u) continue;
+        if ((tile_wants & (1u << channel)) == 0u || index + 1u == push.mapped) continue;
         begin_light(lights[index]);
         float before = visible_fraction(fractions, channel);
         bool open = lit && before > 0.0;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "render/passes/forward.h"
+#include "render/passes/upscale.h"
 #include "render/passes/outline.gpu.h"
 #include "field/brick_set.h"
 #include "render/passes/passes.h"
@@ -97,6 +98,7 @@ Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Ima
         mask.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
     }
     mark_meshes(g, in, visibility, in.outline_count, mask);
+    if (in.upscales) mask = upscale_mask(g, in, mask);
     const Image seeds = outline_flood(g, in.outlines, mask, in.widest_outline);
     Image out = g.create("shown outlined", {.size = shown.size, .format = rhi::Format::Rgba8Unorm});
     g.dispatch(kOutlineDraw, shown.size,

@@ -49,7 +49,7 @@ Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const I
                {&call, 1});
         load = rhi::Load::Load;
     }
-    return load == rhi::Load::Clear ? shown : lay_over(g, in, drawn, shown);
+    return load == rhi::Load::Clear ? shown : lay_over(g, drawn, shown);
 }
 
 }  // namespace kiln::render

@@ -31,8 +31,9 @@ struct ParticlePush {
     uint across_0, across_1, across_2, across_3, across_4;  // bins in a row
     uint behind;  // 1: there is something transparent, that hides particles behind it in part
     uint moves;   // 1: what they move is told
-    uint pad_0;
+    uint sun;     // the light whose shadows fall on them; kNoSun: none
 };
+KILN_CONST uint kNoSun = ~0u;
 
 #ifdef __cplusplus
 static_assert(sizeof(ParticleRecord) == 64 && sizeof(ParticlePush) == 64);

@@ -8,6 +8,7 @@
 #include "render/gpu_meshes.h"
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
+#include "render/passes/cascades.gpu.h"
 #include "render/passes/frame.gpu.h"
 #include "render/passes/lines.gpu.h"
 #include "render/passes/outline.gpu.h"
@@ -72,6 +73,17 @@ struct ParticleHandles {
     Buffer records, ends, numbers;
     uint32_t count = 0;
     std::array<uint32_t, size_t(kParticleLevels)> first_level{}, across{};
+    // The sun on them: a picture with a pixel each, whose rays begin in their middles and whose tiles' lists have that light alone.
+    uint32_t sun = kNoSun;
+    rhi::Extent size;
+    Block frame;
+    Buffer rays, masks;
+};
+
+// Shadow maps of meshes under one light, see cascades.h; none: maps is not an image.
+struct CascadeHandles {
+    Image maps;
+    Block block;  // CascadesBlock
 };
 
 // A part of a tile, behind whose pixels something may let light through: a picture of its own, whose rays then go elsewhere.
@@ -141,6 +153,15 @@ struct TileInputs {
     bool has_particles = false;
     ParticleHandles particles;
     Buffer all_light_rects;  // LightRect a light, all of any picture; where `through` is not empty
+    bool has_cascades = false;
+    bool cascades_alone = false;  // no other light is shadowed by meshes
+    uint32_t mapped_light = 0;    // whose
+    CascadeHandles cascades;
+    uint32_t volume_count = 0;  // lights that are rasterised
+    Buffer volumes;             // their numbers
+    bool upscales = false;      // with taa: the rays of a smaller picture are made into this one over time
+    rhi::Extent shown_size;     // of the picture: else `size`
+    vec2 jitter;                // where in its pixels this frame looks
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

@@ -16,7 +16,8 @@ KILN_CONST uint kLightsAtOnce = 16u;
 struct ShadowPush {
     uint first_light;  // of this batch, in the list of each tile
     uint more;         // 1: batches follow, sums are kept for them
-    uint pad_0, pad_1;
+    uint mapped;       // number plus one of the light whose shadows of meshes come from cascades; 0: none
+    uint pad_0;
 };
 
 #ifdef __cplusplus
