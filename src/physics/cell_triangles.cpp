@@ -53,7 +53,8 @@ void triangles_in(const field::SdfField& field, float h, const Box3& box, std::v
         const float across = float(b.side) * h, half = 0.5f * across;
         const vec3 at = vec3{float(b.low.x), float(b.low.y), float(b.low.z)} * h;
         // 1-Lipschitz, but for what interpolation adds: no surface in it.
-        if (std::abs(field.distance(at + vec3{half, half, half})) > kHalfDiagonal * across + 2 * field.error()) continue;
+        if (std::abs(field.distance(at + vec3{half, half, half})) > kHalfDiagonal * across + 2 * field.error())
+            continue;
         if (b.side > kLeaf) {
             const int s = b.side / 2;
             for (int k = 7; k >= 0; --k)

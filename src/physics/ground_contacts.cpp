@@ -9,7 +9,7 @@ namespace kiln::physics {
 namespace {
 constexpr float kBorder = 1e-3f;  // of a brick: both sides may tell of what lies in a border
 constexpr float kMostSides = 3;   // a body larger than so many regions touches the field
-}
+}  // namespace
 
 Box3 box_of(const Convex& body, const Pose& pose) {
     const vec3 half = half_extents(body);
@@ -25,8 +25,9 @@ bool collide_ground(const SdfShape& ground, const Convex& body, const Pose& grou
     const Regions& regions = *ground.regions();
     bool any = false;
     const bool small = outer_radius(body) < 0.5f * kMostSides * regions.side();
-    const bool all = small && regions.size() > 0 && regions.each(box_of(body, ground_from_body).inflated(margin),
-                                                        [&](const Regions::Entry&) { any = true; });
+    const bool all =
+        small && regions.size() > 0 &&
+        regions.each(box_of(body, ground_from_body).inflated(margin), [&](const Regions::Entry&) { any = true; });
     if (any && !(ground.bricks().distance(ground_from_body.position) > 0)) any = false;
     if (any && all) {
         out.clear();

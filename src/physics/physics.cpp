@@ -6,6 +6,7 @@
 #include "physics/convex_field.h"
 #include "physics/ground_contacts.h"
 #include "physics/jolt/jolt_world.h"
+#include "physics/mesh_mass.h"
 #include "physics/sdf_collision.h"
 
 #include "base/assert.h"
@@ -52,12 +53,13 @@ std::optional<Error> fault_of(const BodySettings& s) {
     if (!rate(s.mesh_voxel) || (s.mesh_voxel > 0 && (s.motion != Motion::Static || !is_field(s.shape))))
         return refused("a size of voxels to mesh: only static fields have one, a finite number of 0 or more");
     if (const Triangles* t = triangles_of(s.shape)) {
-        if (s.motion != Motion::Static) return refused("triangles that is to move: only static bodies may have them");
         if (t->indices.empty() || t->indices.size() % 3 != 0 || t->solid == nullptr) return refused("no triangles");
         for (const uint32_t i : t->indices)
             if (i >= t->vertices.size()) return refused("a triangle of a vertex that there is not");
         for (const vec3 v : t->vertices)
             if (!finite(v)) return refused("a vertex that is not finite; write finite numbers");
+        if (s.motion != Motion::Static && !t->solid->moves())
+            return refused("triangles whose solid cannot move: only static bodies may have it");
     } else if (is_field(s.shape)) {
         if (s.motion != Motion::Static && !field_of(s.shape).moves())
             return refused("a field that cannot move: only static bodies may have it");
@@ -102,6 +104,12 @@ const SdfShape* solid_of(const BodyShape& shape) {
 
 Result<BodyId> World::add(const BodySettings& settings) {
     if (auto fault = fault_of(settings)) return std::move(*fault);
+    std::shared_ptr<const SdfShape> weighed;  // of triangles that move
+    if (const Triangles* t = triangles_of(settings.shape); t != nullptr && settings.motion != Motion::Static) {
+        const auto mass = mass_of_mesh(*t);
+        if (!mass) return mass.error();
+        weighed = t->solid->with(*mass);
+    }
     if (count_ == kMostBodies)
         return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
     uint32_t index = uint32_t(bodies_.size());
@@ -113,10 +121,11 @@ Result<BodyId> World::add(const BodySettings& settings) {
     }
     Body& body = bodies_[index];
     body.settings = settings;
+    if (weighed != nullptr) body.settings.shape = std::move(weighed);
     body.mass = {};
     body.body_from_mass = {};
     if (settings.motion != Motion::Static) {
-        body.mass = physics::mass_of(settings);
+        body.mass = physics::mass_of(body.settings);
         body.body_from_mass = {body.mass.center, body.mass.axes};
         if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     }

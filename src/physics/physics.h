@@ -28,8 +28,8 @@ using BodyId = Id<struct BodyTag>;
 
 enum class Motion : uint8_t { Static, Kinematic, Dynamic };
 
-/// Triangles of what stands, wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions
-/// are answered from it.
+/// Triangles wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions are answered from
+/// it. Those of what moves must be closed: they say its mass (mesh_mass.h), and it collides as its solid, which is then SdfShape::moving().
 struct Triangles {
     std::vector<vec3> vertices;
     std::vector<uint32_t> indices;  ///< three a triangle
@@ -133,7 +133,7 @@ public:
     std::span<const Touch> touches() const { return touches_; }
     /// Where the two of a pair touch, as contacts are found: on one of them, with normals out of the other (`body`). For pictures.
     std::vector<BodyContact> touch_points(const Touch& touch) const;
-    /// Null for a body that is no more.
+    /// Null for a body that is no more. Of triangles that move: their solid, with the mass that they bound.
     const BodyShape* shape(BodyId id) const;
 
     /// First body on the way from `origin` to origin + way.

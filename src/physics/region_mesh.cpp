@@ -16,10 +16,10 @@ namespace kiln::physics {
 namespace {
 
 constexpr int kVoxels = field::kBrickVoxels, kTexels = field::kBrickTexels;
-constexpr int kBlock = 3;                         // bricks a side that are looked at together first
-constexpr int kAcross = kRegionCells + 2;         // with the apron
-constexpr float kHalfDiagonal = 0.8661f;          // of a side
-constexpr int kFarthest = 1 << 19;                // regions from the origin; floats end long before
+constexpr int kBlock = 3;                  // bricks a side that are looked at together first
+constexpr int kAcross = kRegionCells + 2;  // with the apron
+constexpr float kHalfDiagonal = 0.8661f;   // of a side
+constexpr int kFarthest = 1 << 19;         // regions from the origin; floats end long before
 static_assert(kAcross % kBlock == 0);
 
 struct Brick {
@@ -44,7 +44,8 @@ std::vector<Brick> bricks_of(const field::SdfField& exact, float h, ivec3 region
                 // 1-Lipschitz both ways: no surface in the block.
                 if (std::abs(exact.distance(middle)) > kHalfDiagonal * across) continue;
                 for (int i = 0; i < kBlock * kBlock * kBlock; ++i) {
-                    const ivec3 cell = first + ivec3{bx + i % kBlock, by + i / kBlock % kBlock, bz + i / (kBlock * kBlock)};
+                    const ivec3 cell =
+                        first + ivec3{bx + i % kBlock, by + i / kBlock % kBlock, bz + i / (kBlock * kBlock)};
                     // Positions as all bricks have them: whole numbers first, so that neighbours agree.
                     float x[kTexels], y[kTexels], z[kTexels];
                     for (int k = 0; k < kTexels; ++k) {
@@ -109,12 +110,15 @@ std::shared_ptr<RegionMesh> mesh_region(const field::SdfField& exact, float voxe
     out->first_of.assign(next.begin(), next.begin() + kBricks + 1);
     out->indices.resize(3 * count);
     for (size_t t = 0; t < count; ++t)
-        std::memcpy(out->indices.data() + 3 * size_t(next[brick[t]]++), mesh.triangles.data() + 3 * t, 3 * sizeof(uint32_t));
+        std::memcpy(out->indices.data() + 3 * size_t(next[brick[t]]++), mesh.triangles.data() + 3 * t,
+                    3 * sizeof(uint32_t));
     return out;
 }
 
 ivec3 Regions::region_of(vec3 p) const {
-    const auto part = [&](float v) { return floor_of(std::clamp(v / side_, -float(kFarthest) + 1, float(kFarthest) - 1)); };
+    const auto part = [&](float v) {
+        return floor_of(std::clamp(v / side_, -float(kFarthest) + 1, float(kFarthest) - 1));
+    };
     return {part(p.x), part(p.y), part(p.z)};
 }
 

@@ -29,7 +29,7 @@ struct RegionMesh {
     ivec3 region;
     float cell = 0;  ///< metres: side of a brick
     std::vector<vec3> vertices;
-    std::vector<uint32_t> indices;     ///< three a triangle; those of the region by its bricks (z, y, x), then the apron's
+    std::vector<uint32_t> indices;  ///< three a triangle; those of the region by its bricks (z, y, x), then the apron's
     std::vector<uint32_t> first_of;    ///< by brick: its first triangle; one more at the end: how many the region has
     std::shared_ptr<const void> made;  ///< what an engine made of it (World::region_builder())
 

@@ -36,6 +36,8 @@ public:
     std::shared_ptr<const SdfShape> renewed() const;
     /// The same as ground of which some regions are meshed.
     std::shared_ptr<const SdfShape> with(std::shared_ptr<const Regions> regions) const;
+    /// The same with another mass for 1 kg/m³: of a mesh that bounds it more exactly than a grid does.
+    std::shared_ptr<const SdfShape> with(const MassProperties& mass) const;
     /// Null where none ever is: convex bodies touch the field everywhere.
     const Regions* regions() const { return regions_.get(); }
 

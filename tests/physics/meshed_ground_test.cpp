@@ -26,10 +26,8 @@ constexpr float kSide = kCell * float(kRegionCells * field::kBrickVoxels);  // o
 constexpr float kLanded = 1;  // seconds: settled, meshed and landed, with room
 
 BodySettings ground_of(const std::vector<Edit>& edits, bool mesh, float friction = 0.5f) {
-    return {.shape = fixed(edits, kCell),
-            .motion = Motion::Static,
-            .friction = friction,
-            .mesh_voxel = mesh ? kCell : 0};
+    return {
+        .shape = fixed(edits, kCell), .motion = Motion::Static, .friction = friction, .mesh_voxel = mesh ? kCell : 0};
 }
 size_t meshed_regions(const Scene& s, BodyId ground) {
     const SdfShape* shape = solid_of(*s.world->shape(ground));
@@ -104,7 +102,8 @@ TEST(RegionMesh, ABoxIsAnsweredWithTheTrianglesThatMeetItAndNoneTwice) {
 
 TEST_P(MeshedGround, ThingsComeToRestWhereTheyDoOnTheField) {
     // Smooth: a plane and a basin. Sharp: on the edge of a block, half over it.
-    const std::vector<Edit> edits{edit(Plane{}, {0, 0.03f, 0}), edit(kiln::Sphere{.radius = 3}, {-6, 2.5f, 0}, Op::Subtract, 0.2f),
+    const std::vector<Edit> edits{edit(Plane{}, {0, 0.03f, 0}),
+                                  edit(kiln::Sphere{.radius = 3}, {-6, 2.5f, 0}, Op::Subtract, 0.2f),
                                   edit(kiln::Box{.half_extents = {1.53f, 0.52f, 1.5f}}, {6, 0, 0})};
     struct Drop {
         Solid solid;
@@ -158,10 +157,11 @@ TEST_P(MeshedGround, ASlideAcrossRegionsKeepsItsEnergyAndNeverKicks) {
         const bool lies = solid.convex.kind == Convex::Kind::Capsule;  // along its way
         // It comes down from 2 cm, and so a little into the ground.
         const float height = (lies ? solid.convex.size.x : half_extents(solid.convex).y) + 0.05f;
-        const BodyId id = s.add({.shape = solid.exact(),
-                                 .pose = {{-2.6f * kSide, height, 0.01f}, lies ? axis_angle({0, 0, 1}, kPi / 2) : quat{}},
-                                 .friction = 0,
-                                 .linear_velocity = {6, 0, 0}});
+        const BodyId id =
+            s.add({.shape = solid.exact(),
+                   .pose = {{-2.6f * kSide, height, 0.01f}, lies ? axis_angle({0, 0, 1}, kPi / 2) : quat{}},
+                   .friction = 0,
+                   .linear_velocity = {6, 0, 0}});
         int kicks = 0;
         for (int i = 0; i < 420; ++i) {
             const vec3 before = s.world->state(id).linear_velocity;
@@ -181,9 +181,11 @@ TEST_P(MeshedGround, ABallRollsDownAMeshedSlopeAsTheFormulaSays) {
     Scene s(GetParam());
     s.add(ground_of({inclined_plane(degrees)}, true, 1));
     // At rest until the region is meshed: held by a peg that is then taken away.
-    const BodyId peg = s.add({.shape = Convex::box({0.1f, 1, 1}), .motion = Motion::Static,
-                              .pose = {out_of(degrees) * 0.5f + downhill(degrees) * 0.61f, axis_angle({0, 0, 1}, -degrees * kPi / 180)},
-                              .friction = 0});
+    const BodyId peg = s.add(
+        {.shape = Convex::box({0.1f, 1, 1}),
+         .motion = Motion::Static,
+         .pose = {out_of(degrees) * 0.5f + downhill(degrees) * 0.61f, axis_angle({0, 0, 1}, -degrees * kPi / 180)},
+         .friction = 0});
     const BodyId id = s.add({.shape = Convex::sphere(0.5f), .pose = {out_of(degrees) * 0.5f, {}}, .friction = 1});
     s.run(kLanded);
     s.world->remove(peg);

@@ -45,9 +45,8 @@ RegionEdges::RegionEdges(const RegionMesh& mesh) {
             const uint32_t a = mesh.indices[3 * t + i], b = mesh.indices[3 * t + (i + 1) % 3];
             edges.push_back({uint64_t(std::min(a, b)) << 32 | std::max(a, b), t, i});
         }
-    std::sort(edges.begin(), edges.end(), [](const Edge& p, const Edge& q) {
-        return p.key != q.key ? p.key < q.key : p.triangle < q.triangle;
-    });
+    std::sort(edges.begin(), edges.end(),
+              [](const Edge& p, const Edge& q) { return p.key != q.key ? p.key < q.key : p.triangle < q.triangle; });
     beside_.assign(mesh.own(), {-1, -1, -1});
     for (size_t i = 0; i + 1 < edges.size(); ++i) {
         const Edge &p = edges[i], &q = edges[i + 1];
@@ -74,8 +73,7 @@ std::optional<vec3> RegionEdges::allowed(const RegionMesh& mesh, uint32_t triang
         // Of an edge that sticks out the normal turns forward about it, from this triangle's to the other's.
         const float bend = dot(cross(face, beyond), along);
         // What is met from inside is lifted by the face.
-        if (!(bend > kFlat * length(along)))
-            return across > 0 && across < kFace ? std::nullopt : std::optional(face);
+        if (!(bend > kFlat * length(along))) return across > 0 && across < kFace ? std::nullopt : std::optional(face);
         if (d2 > nearest) continue;
         nearest = d2;
         const bool past_own = dot(cross(face, normal), along) < 0, past_other = dot(cross(normal, beyond), along) < 0;

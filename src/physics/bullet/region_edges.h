@@ -19,7 +19,8 @@ public:
     std::optional<vec3> allowed(const RegionMesh& mesh, uint32_t triangle, vec3 p, vec3 normal) const;
 
 private:
-    std::vector<std::array<int32_t, 3>> beside_;  // by own triangle: the one beyond the edge from corner i to i + 1; -1: none
+    std::vector<std::array<int32_t, 3>>
+        beside_;  // by own triangle: the one beyond the edge from corner i to i + 1; -1: none
 };
 
 }  // namespace kiln::physics
