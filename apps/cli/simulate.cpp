@@ -17,7 +17,7 @@ namespace kiln::cli {
 namespace {
 
 struct Options {
-    std::string scene, edits;
+    std::string scene, edits, ground = "field";
     SimulateSettings settings;
     std::string out;
     PictureOptions pictures;
@@ -37,6 +37,7 @@ int simulate(const Options& o) {
         if (!commands) return fail(commands.error());
         settings.edits = std::move(*commands);
     }
+    settings.mesh_ground = o.ground == "mesh";
     std::optional<Film> film;
     if (o.png) {
         if (o.out.empty())
@@ -85,6 +86,9 @@ void add_simulate(CLI::App& app, Run& run) {
     verb->add_option("--backend", o->settings.backend, "physics engine, see `kiln doctor`; left out: the default");
     verb->add_flag("--field-bodies", o->settings.field_bodies,
                    "boxes, balls, capsules and cylinders collide as fields too");
+    verb->add_option("--ground", o->ground,
+                     "what convex bodies touch: the ground's field, or triangles where it has settled")
+        ->check(CLI::IsMember({"field", "mesh"}));
     verb->add_option("--edits", o->edits,
                      "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");

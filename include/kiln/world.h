@@ -118,7 +118,9 @@ struct SimulateSettings {
     double every = 0;           ///< seconds between frames of the answer; 0: each step
     std::string backend{};      ///< one of physics_backends(); empty: the first that works
     bool field_bodies = false;  ///< also bodies with an exact convex shape collide as fields
-    int threads = 0;            ///< 0: all cores; the answer is the same for any number
+    bool mesh_ground =
+        false;        ///< convex bodies touch triangles of the ground where it has settled, else its field everywhere
+    int threads = 0;  ///< 0: all cores; the answer is the same for any number
     /// Changes of the world's own edits: each comes before the first step that begins at its time or later. By ascending time.
     std::vector<TimedCommand> edits{};
 };

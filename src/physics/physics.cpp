@@ -4,7 +4,9 @@
 
 #include "physics/bullet/bullet_world.h"
 #include "physics/convex_field.h"
+#include "physics/ground_contacts.h"
 #include "physics/jolt/jolt_world.h"
+#include "physics/mesh_mass.h"
 #include "physics/sdf_collision.h"
 
 #include "base/assert.h"
@@ -24,7 +26,10 @@ bool finite(const Pose& p) {
     return finite(p.position) && std::isfinite(q.x) && std::isfinite(q.y) && std::isfinite(q.z) && std::isfinite(q.w);
 }
 bool is_field(const BodyShape& s) { return std::holds_alternative<std::shared_ptr<const SdfShape>>(s); }
-const SdfShape& field_of(const BodyShape& s) { return *std::get<std::shared_ptr<const SdfShape>>(s); }
+const std::shared_ptr<const SdfShape>& field_ptr(const BodyShape& s) {
+    return std::get<std::shared_ptr<const SdfShape>>(s);
+}
+const SdfShape& field_of(const BodyShape& s) { return *field_ptr(s); }
 
 const Triangles* triangles_of(const BodyShape& s) {
     const auto* t = std::get_if<std::shared_ptr<const Triangles>>(&s);
@@ -45,13 +50,16 @@ std::optional<Error> fault_of(const BodySettings& s) {
         return refused("a friction, restitution or damping that is not a finite number of 0 or more");
     if (s.motion == Motion::Dynamic && !(std::isfinite(s.density) && s.density > 0))
         return refused("a density that is not a finite number above 0");
+    if (!rate(s.mesh_voxel) || (s.mesh_voxel > 0 && (s.motion != Motion::Static || !is_field(s.shape))))
+        return refused("a size of voxels to mesh: only static fields have one, a finite number of 0 or more");
     if (const Triangles* t = triangles_of(s.shape)) {
-        if (s.motion != Motion::Static) return refused("triangles that is to move: only static bodies may have them");
         if (t->indices.empty() || t->indices.size() % 3 != 0 || t->solid == nullptr) return refused("no triangles");
         for (const uint32_t i : t->indices)
             if (i >= t->vertices.size()) return refused("a triangle of a vertex that there is not");
         for (const vec3 v : t->vertices)
             if (!finite(v)) return refused("a vertex that is not finite; write finite numbers");
+        if (s.motion != Motion::Static && !t->solid->moves())
+            return refused("triangles whose solid cannot move: only static bodies may have it");
     } else if (is_field(s.shape)) {
         if (s.motion != Motion::Static && !field_of(s.shape).moves())
             return refused("a field that cannot move: only static bodies may have it");
@@ -81,6 +89,12 @@ MassProperties mass_of(const BodySettings& s) {
 
 Box3 box_around(vec3 center, float radius) { return Box3{center, center}.inflated(radius); }
 
+// Around a box that is turned. One without end stays without.
+Box3 box_of_world(const Box3& box, const Pose& frame) {
+    if (!box.finite()) return box;
+    return box_of(Convex::box(box.half_extents()), {frame * box.center(), frame.rotation});
+}
+
 }  // namespace
 
 const SdfShape* solid_of(const BodyShape& shape) {
@@ -90,6 +104,12 @@ const SdfShape* solid_of(const BodyShape& shape) {
 
 Result<BodyId> World::add(const BodySettings& settings) {
     if (auto fault = fault_of(settings)) return std::move(*fault);
+    std::shared_ptr<const SdfShape> weighed;  // of triangles that move
+    if (const Triangles* t = triangles_of(settings.shape); t != nullptr && settings.motion != Motion::Static) {
+        const auto mass = mass_of_mesh(*t);
+        if (!mass) return mass.error();
+        weighed = t->solid->with(*mass);
+    }
     if (count_ == kMostBodies)
         return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
     uint32_t index = uint32_t(bodies_.size());
@@ -101,14 +121,19 @@ Result<BodyId> World::add(const BodySettings& settings) {
     }
     Body& body = bodies_[index];
     body.settings = settings;
+    if (weighed != nullptr) body.settings.shape = std::move(weighed);
     body.mass = {};
     body.body_from_mass = {};
     if (settings.motion != Motion::Static) {
-        body.mass = physics::mass_of(settings);
+        body.mass = physics::mass_of(body.settings);
         body.body_from_mass = {body.mass.center, body.mass.axes};
         if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     }
     body.last = settings.pose * body.body_from_mass;
+    if (settings.mesh_voxel > 0) {
+        body.mesher = std::make_unique<GroundMesher>(settings.mesh_voxel, region_builder());
+        body.settings.shape = field_ptr(body.settings.shape)->with(body.mesher->regions());
+    }
     body.live = true;
     ++count_;
     create(index, body);
@@ -132,6 +157,7 @@ void World::remove(BodyId id) {
     destroy(id.index);
     Body& b = bodies_[id.index];
     b.live = false;
+    b.mesher.reset();
     b.settings.shape = Convex{};
     // What touched it does so no longer: told with the next step's events, under the id it had.
     ++b.generation;
@@ -178,13 +204,40 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     KILN_ASSERT(b == nullptr || (b->settings.motion == Motion::Static && is_field(b->settings.shape)), "body {}",
                 id.index);
     if (b == nullptr) return;
+    if (b->mesher != nullptr) {
+        b->mesher->changed(box_of_world(changed, inverse(b->settings.pose)));
+        field = field->with(b->mesher->regions());
+    }
     bodies_[id.index].settings.shape = field;
     swap(id.index, std::move(field));
     wake(changed);
 }
 
+// Of what is convex and awake: fields meet the ground's field.
+void World::mesh_ground(float seconds) {
+    for (uint32_t i = 0; i < bodies_.size(); ++i) {
+        Body& ground = bodies_[i];
+        if (!ground.live || ground.mesher == nullptr) continue;
+        const Pose ground_from_world = inverse(ground.settings.pose);
+        for (uint32_t k = 0; k < bodies_.size(); ++k) {
+            const Body& b = bodies_[k];
+            const Convex* convex = std::get_if<Convex>(&b.settings.shape);
+            if (!b.live || convex == nullptr || b.settings.motion != Motion::Dynamic) continue;
+            const BodyState s = get(k);
+            if (s.asleep) continue;
+            ground.mesher->visit(box_around(ground_from_world * s.pose.position, outer_radius(*convex)));
+        }
+        const std::shared_ptr<const SdfShape> shape = field_ptr(ground.settings.shape);
+        if (!ground.mesher->advance(double(seconds), shape->shared_field())) continue;
+        auto next = shape->with(ground.mesher->regions());
+        ground.settings.shape = next;
+        swap(i, std::move(next));
+    }
+}
+
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
+    mesh_ground(seconds);
     advance(seconds);
     for (uint32_t i = 0; i < bodies_.size(); ++i) {
         if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "physics/convex.h"
+#include "physics/ground_mesher.h"
 #include "physics/pose.h"
 #include "physics/sdf_shape.h"
 
@@ -27,8 +28,8 @@ using BodyId = Id<struct BodyTag>;
 
 enum class Motion : uint8_t { Static, Kinematic, Dynamic };
 
-/// Triangles of what stands, wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions
-/// are answered from it.
+/// Triangles wound so that their normals point out; `solid` is what they are the surface of: fields meet it, and questions are answered from
+/// it. Those of what moves must be closed: they say its mass (mesh_mass.h), and it collides as its solid, which is then SdfShape::moving().
 struct Triangles {
     std::vector<vec3> vertices;
     std::vector<uint32_t> indices;  ///< three a triangle
@@ -54,6 +55,9 @@ struct BodySettings {
     float linear_damping = 0, angular_damping = 0;  ///< 1/s
     bool continuous = false;  ///< swept, so that it does not pass through what is thinner than its way in a step
     vec3 linear_velocity{}, angular_velocity{};
+    /// Of static fields, metres: what is convex touches triangles of voxels of this size where the ground has settled (ground_mesher.h);
+    /// 0: the field everywhere.
+    float mesh_voxel = 0;
 };
 
 struct BodyState {
@@ -129,7 +133,7 @@ public:
     std::span<const Touch> touches() const { return touches_; }
     /// Where the two of a pair touch, as contacts are found: on one of them, with normals out of the other (`body`). For pictures.
     std::vector<BodyContact> touch_points(const Touch& touch) const;
-    /// Null for a body that is no more.
+    /// Null for a body that is no more. Of triangles that move: their solid, with the mass that they bound.
     const BodyShape* shape(BodyId id) const;
 
     /// First body on the way from `origin` to origin + way.
@@ -151,6 +155,7 @@ protected:
         MassProperties mass;  // zero for what does not move by itself
         Pose body_from_mass;  // centre of mass and principal axes
         Pose last;            // where it was last known to be, of its mass
+        std::unique_ptr<GroundMesher> mesher;
         uint32_t generation = 0;
         bool live = false;
     };
@@ -168,6 +173,7 @@ protected:
     virtual void push(uint32_t index, vec3 linear, vec3 angular) = 0;
     virtual void swap(uint32_t index, std::shared_ptr<const SdfShape> field) = 0;
     virtual void advance(float seconds) = 0;
+    virtual GroundMesher::Build region_builder() const = 0;
     /// Pairs of bodies that touch now, in any order, with the lower index first.
     struct Pair {
         uint32_t a, b;
@@ -179,6 +185,7 @@ protected:
 
 private:
     const MassProperties& mass_of(BodyId id) const;
+    void mesh_ground(float seconds);
     template <typename Ask>
     auto ask(uint32_t index, Ask&& ask_field) const;
     template <typename Ask>

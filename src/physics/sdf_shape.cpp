@@ -138,6 +138,18 @@ std::shared_ptr<const SdfShape> SdfShape::renewed() const {
     return out;
 }
 
+std::shared_ptr<const SdfShape> SdfShape::with(std::shared_ptr<const Regions> regions) const {
+    std::shared_ptr<SdfShape> out(new SdfShape(*this));
+    out->regions_ = std::move(regions);
+    return out;
+}
+
+std::shared_ptr<const SdfShape> SdfShape::with(const MassProperties& mass) const {
+    std::shared_ptr<SdfShape> out(new SdfShape(*this));
+    out->mass_ = mass;
+    return out;
+}
+
 Result<std::shared_ptr<const SdfShape>> SdfShape::moving(std::shared_ptr<const field::SdfField> field,
                                                          std::shared_ptr<const field::SdfField> bricks) {
     const Box3 box = field->bounds();

@@ -11,6 +11,8 @@
 
 namespace kiln::physics {
 
+class Regions;
+
 /// In the body's frame. `moments` are about the centre along the axes of `axes` (body = axes · principal).
 struct MassProperties {
     double mass = 0;  ///< kg
@@ -32,9 +34,16 @@ public:
                                                           std::shared_ptr<const field::SdfField> bricks = nullptr);
     /// The same with bricks(): null where they need no renewal (SdfField::renewed()).
     std::shared_ptr<const SdfShape> renewed() const;
+    /// The same as ground of which some regions are meshed.
+    std::shared_ptr<const SdfShape> with(std::shared_ptr<const Regions> regions) const;
+    /// The same with another mass for 1 kg/m³: of a mesh that bounds it more exactly than a grid does.
+    std::shared_ptr<const SdfShape> with(const MassProperties& mass) const;
+    /// Null where none ever is: convex bodies touch the field everywhere.
+    const Regions* regions() const { return regions_.get(); }
 
     /// What questions and casts are answered from.
     const field::SdfField& field() const { return *field_; }
+    const std::shared_ptr<const field::SdfField>& shared_field() const { return field_; }
     /// What contacts are found on.
     const field::SdfField& bricks() const { return *bricks_; }
     /// What a walk down the surface is led by: the field where it is short, which then costs no more than its bricks and has no facets.
@@ -70,6 +79,7 @@ private:
     float spacing_ = 0;
     std::vector<float> x_, y_, z_;
     std::vector<Group> groups_;
+    std::shared_ptr<const Regions> regions_;
 };
 
 }  // namespace kiln::physics

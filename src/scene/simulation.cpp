@@ -53,6 +53,7 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
     if (!list) return list.error();
     out->voxel_size_ = start.impl_->resolution(*start.impl_->compiled(), start.field_settings).voxel_size;
     out->near_ = 8 * out->voxel_size_;
+    out->mesh_voxel_ = settings.mesh_ground ? out->voxel_size_ : 0;
     if (auto done = out->set_ground(std::move(*list), {}); !done) return done.error();
     if (auto done = out->add_bodies(settings); !done) return done.error();
     if (auto done = out->add_triggers(); !done) return done.error();
@@ -103,7 +104,8 @@ Result<void> Simulation::set_ground(std::shared_ptr<const field::ProgramField> l
                       .motion = physics::Motion::Static,
                       .friction = data.physics.friction,
                       .restitution = data.physics.restitution,
-                      .surfaces = surfaces_of(data)},
+                      .surfaces = surfaces_of(data),
+                      .mesh_voxel = mesh_voxel_},
                      kWorldName);
     if (!added) return added;
     ground_body_ = members_.back().body;

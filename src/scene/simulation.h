@@ -114,6 +114,7 @@ private:
     std::vector<field::LayeredField::Layer> cuts_;
     std::optional<physics::BodyId> ground_body_;
     float voxel_size_ = 0, near_ = 0;  // metres
+    float mesh_voxel_ = 0;             // metres; 0: bodies touch the field
     struct Part {
         size_t member;
         std::shared_ptr<const field::PartField> field;

@@ -585,6 +585,11 @@ TEST_F(Cli, SimulateTellsWaysAndFaults) {
     EXPECT_EQ(run("simulate s.kiln.json --seconds 0.5 --json --threads 1").out,
               run("simulate s.kiln.json --seconds 0.5 --json --threads 2").out);
     EXPECT_EQ(run("simulate s.kiln.json --seconds 1 --json --backend bullet --field-bodies").code, 0);
+    const Outcome meshed = run("simulate s.kiln.json --seconds 2 --json --ground mesh");
+    EXPECT_EQ(meshed.code, 0) << meshed.err;
+    EXPECT_EQ(meshed.out, run("simulate s.kiln.json --seconds 2 --json --ground mesh --threads 1").out);
+    EXPECT_NE(meshed.out, run("simulate s.kiln.json --seconds 2 --json --ground field").out);
+    EXPECT_EQ(run("simulate s.kiln.json --seconds 1 --ground sand").code, 2);
     EXPECT_EQ(run("simulate s.kiln.json").code, 2);
     EXPECT_EQ(run("simulate s.kiln.json --seconds 1 --backend none").code, 2);
     EXPECT_EQ(run("simulate nowhere.kiln.json --seconds 1").code, 3);

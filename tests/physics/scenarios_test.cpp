@@ -20,13 +20,14 @@ struct EachEngine : Engines {};
 KILN_EACH_ENGINE(EachEngine);
 
 TEST_P(EachEngine, ABulletStopsAtAThinWallAtAThousandMetresASecond) {
-    for (const float speed : {50.0f, 200.0f, 1000.0f}) {
+    for (const float speed : {50.0f, 200.0f, 1000.0f, -1000.0f}) {  // below 0: as a field
         Scene s(GetParam(), {0, 0, 0});
         s.ground({edit(kiln::Box{.half_extents = {0.05f, 5, 5}})});
-        const BodyId id = s.add({.shape = Convex::sphere(0.05f),
+        const BodyId id = s.add({.shape = speed > 0 ? BodyShape(Convex::sphere(0.05f))
+                                                    : BodyShape(moving({edit(kiln::Sphere{.radius = 0.05f})})),
                                  .pose = {{-7.3f, 0.2f, 0.1f}, {}},
                                  .continuous = true,
-                                 .linear_velocity = {speed, 0, 0}});
+                                 .linear_velocity = {std::abs(speed), 0, 0}});
         s.run(0.5f);
         const BodyState state = s.world->state(id);
         EXPECT_NEAR(state.pose.position.x, -0.1f, 0.02f) << speed;
@@ -44,6 +45,37 @@ TEST_P(EachEngine, ABoxFallsThroughARing) {
     s.run(3);
     EXPECT_LT(s.world->state(small).pose.position.y, 0);
     EXPECT_NEAR(s.world->state(large).pose.position.y, 2.5f, 0.1f);
+}
+
+TEST_P(EachEngine, AFieldOfManyPartsMeetsEverythingWithAllOfThem) {
+    // Two blocks on a rod: it lies on both, on a field, on a box, and on one of its own kind across.
+    const kiln::Box block{.half_extents = {0.4f, 0.4f, 0.4f}};
+    const auto dumbbell =
+        moving({edit(block, {-1, 0, 0}), edit(block, {1, 0, 0}), edit(kiln::Box{.half_extents = {1, 0.1f, 0.1f}})});
+    Scene s(GetParam());
+    s.ground({edit(Plane{})}, 1);
+    s.add({.shape = Convex::box({1.5f, 0.5f, 0.5f}),
+           .motion = Motion::Static,
+           .pose = {{6, 0.5f, 0}, {}},
+           .friction = 1});
+    const BodyId low = s.add({.shape = dumbbell, .pose = {{0, 0.45f, 0}, {}}, .friction = 1, .angular_damping = 1});
+    const BodyId boxed = s.add({.shape = dumbbell, .pose = {{6, 1.45f, 0}, {}}, .friction = 1, .angular_damping = 1});
+    const BodyId across = s.add({.shape = dumbbell,
+                                 .pose = {{0, 0.75f, 0}, axis_angle({0, 1, 0}, kPi / 2)},
+                                 .friction = 1,
+                                 .angular_damping = 1});
+    s.run(4);
+    EXPECT_NEAR(s.world->state(low).pose.position.y, 0.4f, 0.02f);
+    EXPECT_NEAR(s.world->state(boxed).pose.position.y, 1.4f, 0.02f);
+    EXPECT_NEAR(s.world->state(across).pose.position.y, 0.6f, 0.03f) << "rod on rod";
+    for (const BodyId id : {low, boxed, across}) EXPECT_EQ(s.world->lost(), 0) << id.index;
+    // A box swept at it stops at the near block; a ray goes between the blocks above the rod.
+    const auto hit = s.world->sweep(Convex::box({0.2f, 0.2f, 0.2f}), {{-5, 0.4f, 0}, {}}, {4, 0, 0});
+    ASSERT_TRUE(hit);
+    EXPECT_EQ(hit->body, low);
+    EXPECT_NEAR(hit->fraction * 4, 5 - 1.4f - 0.2f, 0.01f);
+    EXPECT_FALSE(s.world->cast_ray({6, 1.7f, -2}, {0, 0, 4}));
+    EXPECT_TRUE(s.world->cast_ray({7, 1.7f, -2}, {0, 0, 4}));
 }
 
 TEST_P(EachEngine, QuestionsSeeConvexBodiesAndFields) {

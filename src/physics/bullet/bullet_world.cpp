@@ -2,6 +2,7 @@
 
 #include "physics/bullet/bullet_world.h"
 
+#include "physics/bullet/region_edges.h"
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/sdf_collision.h"
 
@@ -15,8 +16,6 @@
 namespace kiln::physics {
 
 namespace {
-
-vec3 to_vec(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 
 // Half a second below this speed, and a body sleeps: as Jolt has it.
 constexpr float kSleepSeconds = 0.5f, kSleepSpeed = 0.03f;
@@ -52,7 +51,7 @@ public:
 private:
     static btDefaultCollisionConstructionInfo info() {
         btDefaultCollisionConstructionInfo out;
-        out.m_customCollisionAlgorithmMaxElementSize = 192;  // of the pool that algorithms come from
+        out.m_customCollisionAlgorithmMaxElementSize = 224;  // of the pool that algorithms come from
         return out;
     }
 };
@@ -213,7 +212,7 @@ protected:
         object->body = std::make_unique<btRigidBody>(info);
         object->body->setUserIndex(int(index));
         object->body->setUserPointer(this);
-        if (!b.settings.surfaces.empty() || object->mesh != nullptr)
+        if (!b.settings.surfaces.empty() || object->mesh != nullptr || b.settings.mesh_voxel > 0)
             object->body->setCollisionFlags(object->body->getCollisionFlags() |
                                             btCollisionObject::CF_CUSTOM_MATERIAL_CALLBACK);
         object->continuous = dynamic && b.settings.continuous;
@@ -284,6 +283,12 @@ protected:
         dynamics_.stepSimulation(seconds, 0);
         for (auto& o : objects_)
             if (o && o->body->isActive() && !o->body->isStaticOrKinematicObject()) watch(*o, seconds);
+    }
+
+    GroundMesher::Build region_builder() const override {
+        return [](const RegionMesh& mesh) -> std::shared_ptr<const void> {
+            return std::make_shared<const RegionEdges>(mesh);
+        };
     }
 
     void collect(std::vector<Pair>& pairs) const override {

@@ -2,7 +2,12 @@
 
 #include "physics/bullet/sdf_algorithm.h"
 
+#include "physics/bullet/region_edges.h"
+#include "physics/cell_triangles.h"
+#include "physics/ground_contacts.h"
 #include "physics/sdf_collision.h"
+
+#include <BulletCollision/CollisionDispatch/btConvexConcaveCollisionAlgorithm.h>
 
 #include <algorithm>
 #include <cmath>
@@ -96,22 +101,79 @@ protected:
     std::vector<FieldContact> contacts_;
 };
 
+// Contacts with triangles of regions, with the normals that their edges allow. Bullet says which triangle before it adds them; whichever
+// body is the first, normals are out of the triangle, and points on it (btConvexTriangleCallback).
+class OnRegions final : public btManifoldResult {
+public:
+    OnRegions(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const Regions& regions,
+              const Pose& world_from_ground, bool ground_first)
+        : btManifoldResult(a, b), regions_(regions), world_(world_from_ground), ground_first_(ground_first) {}
+    void addContactPoint(const btVector3& normal, const btVector3& point, btScalar distance) override {
+        const Regions::Entry* e = regions_.numbered(uint32_t(ground_first_ ? m_partId0 : m_partId1));
+        const uint32_t triangle = uint32_t(ground_first_ ? m_index0 : m_index1);
+        const Pose local = inverse(world_);
+        const auto& edges = *static_cast<const RegionEdges*>(e->mesh->made.get());
+        const auto allowed =
+            edges.allowed(*e->mesh, triangle, local * to_vec(point), rotate(local.rotation, to_vec(normal)));
+        if (!allowed) return;
+        const btVector3 out = to_bullet(rotate(world_.rotation, *allowed));
+        btManifoldResult::addContactPoint(out, point + (normal - out) * distance, distance);
+    }
+
+private:
+    const Regions& regions_;
+    Pose world_;
+    bool ground_first_;
+};
+
 // kFieldFirst: body 0 is the field.
 template <bool kFieldFirst>
 class ConvexAlgorithm final : public SdfAlgorithm {
 public:
     using SdfAlgorithm::SdfAlgorithm;
-    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
-                          btManifoldResult* result) override {
+    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                          const btDispatcherInfo& settings, btManifoldResult* result) override {
         const btCollisionObjectWrapper *field = kFieldFirst ? a : b, *convex = kFieldFirst ? b : a;
         const auto& shape = static_cast<const BulletSdfShape&>(*field->getCollisionShape());
         const Pose world_from_field = to_pose(field->getWorldTransform()) * inverse(shape.field_from_body());
         const Pose field_from_convex = inverse(world_from_field) * to_pose(convex->getWorldTransform());
-        if (as_before(field_from_convex, shape.revision(), result)) return;
-        collide(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
-        result->setPersistentManifold(manifold_);
-        add(result, world_from_field, kFieldFirst);
+        if (shape.sdf().regions() == nullptr) {
+            if (as_before(field_from_convex, shape.revision(), result)) return;
+            collide(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
+            result->setPersistentManifold(manifold_);
+            add(result, world_from_field, kFieldFirst);
+            return;
+        }
+        const bool triangles =
+            collide_ground(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
+        if (contacts_.empty()) {
+            manifold_->clearManifold();
+        } else {
+            result->setPersistentManifold(manifold_);
+            add(result, world_from_field, kFieldFirst);
+        }
+        if (!triangles) {
+            on_triangles_.reset();
+            return;
+        }
+        if (on_triangles_ == nullptr) {
+            btCollisionAlgorithmConstructionInfo info;
+            info.m_dispatcher1 = m_dispatcher;
+            on_triangles_ = std::make_unique<btConvexConcaveCollisionAlgorithm>(info, a, b, kFieldFirst);
+        }
+        const btCollisionObjectWrapper regions(field->m_parent, &shape.regions(), field->getCollisionObject(),
+                                               field->getWorldTransform(), -1, -1);
+        OnRegions contacts(a, b, *shape.sdf().regions(), world_from_field, kFieldFirst);
+        on_triangles_->processCollision(kFieldFirst ? &regions : convex, kFieldFirst ? convex : &regions, settings,
+                                        &contacts);
     }
+    void getAllContactManifolds(btManifoldArray& all) override {
+        SdfAlgorithm::getAllContactManifolds(all);
+        if (on_triangles_ != nullptr) on_triangles_->getAllContactManifolds(all);
+    }
+
+private:
+    std::unique_ptr<btConvexConcaveCollisionAlgorithm> on_triangles_;  // of meshed ground
 };
 
 // Two fields, or a field and a mesh, which is met as the solid that it is the surface of.
@@ -154,9 +216,58 @@ struct Create final : btCollisionAlgorithmCreateFunc {
 }  // namespace
 
 BulletSdfShape::BulletSdfShape(std::shared_ptr<const SdfShape> shape, const Pose& field_from_body)
-    : sdf_(std::move(shape)), field_from_body_(field_from_body) {
+    : sdf_(std::move(shape)), regions_(sdf_), field_from_body_(field_from_body) {
     m_shapeType = CUSTOM_CONCAVE_SHAPE_TYPE;
     m_collisionMargin = 0;
+}
+
+namespace {
+
+// Of the voxels that bricks have; where there are no bricks, of the surface points, or of what a person would not feel.
+float voxel_of(const SdfShape& shape) {
+    if (const float error = shape.bricks().error(); error > 0) return 2 * error;
+    return shape.spacing() > 0 ? shape.spacing() : 0.1f;
+}
+
+}  // namespace
+
+void BulletSdfShape::processAllTriangles(btTriangleCallback* callback, const btVector3& low,
+                                         const btVector3& high) const {
+    const vec3 from{low.x(), low.y(), low.z()}, to{high.x(), high.y(), high.z()};
+    const Box3 box =
+        box_of(Convex::box((to - from) * 0.5f), {field_from_body_ * ((from + to) * 0.5f), field_from_body_.rotation});
+    std::vector<vec3> corners;
+    triangles_in(sdf_->bricks(), voxel_of(*sdf_), box, corners);
+    const Pose body_from_field = inverse(field_from_body_);
+    for (size_t i = 0; i < corners.size(); i += 3) {
+        btVector3 triangle[3];
+        for (size_t k = 0; k < 3; ++k) triangle[k] = to_bullet(body_from_field * corners[i + k]);
+        callback->processTriangle(triangle, 0, int(i / 3));
+    }
+}
+
+BulletRegionsShape::BulletRegionsShape(std::shared_ptr<const SdfShape> shape) : sdf_(std::move(shape)) {
+    // Bullet takes the custom type for its own class of fields where it looks for triangles.
+    m_shapeType = FAST_CONCAVE_MESH_PROXYTYPE;
+    m_collisionMargin = 0;
+}
+
+void BulletRegionsShape::getAabb(const btTransform&, btVector3& low, btVector3& high) const {
+    low.setValue(-kWorldSize, -kWorldSize, -kWorldSize);
+    high.setValue(kWorldSize, kWorldSize, kWorldSize);
+}
+
+// The frame of what stands is the field's.
+void BulletRegionsShape::processAllTriangles(btTriangleCallback* callback, const btVector3& low,
+                                             const btVector3& high) const {
+    const Box3 box{{low.x(), low.y(), low.z()}, {high.x(), high.y(), high.z()}};
+    sdf_->regions()->each(box, [&](const Regions::Entry& e) {
+        e.mesh->each(box, [&](uint32_t t) {
+            btVector3 triangle[3];
+            for (uint32_t k = 0; k < 3; ++k) triangle[k] = to_bullet(e.mesh->vertices[e.mesh->indices[3 * t + k]]);
+            callback->processTriangle(triangle, int(e.number), int(t));
+        });
+    });
 }
 
 void BulletSdfShape::getAabb(const btTransform& t, btVector3& low, btVector3& high) const {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Fields as shapes of Bullet: a custom concave shape, and the collision algorithms for its pairs. Bullet's own paths over triangles never
-// see it: rays, sweeps and continuous motion are answered by the field itself (physics.h, bullet_world.cpp).
+// Fields as shapes of Bullet: a custom concave shape, and the collision algorithms for its pairs. Rays, sweeps and continuous motion of ours
+// are answered by the field itself (physics.h, bullet_world.cpp); Bullet's own, which know triangles only, are given those of the voxels they
+// pass.
 #pragma once
 
 #include "physics/physics.h"
@@ -14,10 +15,29 @@ inline Pose to_pose(const btTransform& t) {
     const btQuaternion q = t.getRotation();
     return {{p.x(), p.y(), p.z()}, {q.x(), q.y(), q.z(), q.w()}};
 }
+inline vec3 to_vec(const btVector3& v) { return {v.x(), v.y(), v.z()}; }
 inline btVector3 to_bullet(vec3 v) { return {v.x, v.y, v.z}; }
 inline btTransform to_bullet(const Pose& p) {
     return btTransform(btQuaternion(p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w), to_bullet(p.position));
 }
+
+/// The triangles of meshed regions alone.
+class BulletRegionsShape final : public btConcaveShape {
+public:
+    explicit BulletRegionsShape(std::shared_ptr<const SdfShape> shape);
+    void set(std::shared_ptr<const SdfShape> shape) { sdf_ = std::move(shape); }
+    void getAabb(const btTransform&, btVector3& low, btVector3& high) const override;
+    void calculateLocalInertia(btScalar, btVector3& inertia) const override { inertia.setZero(); }
+    void setLocalScaling(const btVector3&) override {}
+    const btVector3& getLocalScaling() const override { return one_; }
+    const char* getName() const override { return "regions"; }
+    /// `part` is the region's number, `index` its triangle's.
+    void processAllTriangles(btTriangleCallback* callback, const btVector3& low, const btVector3& high) const override;
+
+private:
+    std::shared_ptr<const SdfShape> sdf_;
+    btVector3 one_{1, 1, 1};
+};
 
 /// `field_from_body`: from Bullet's frame, that of the mass, to the field's.
 class BulletSdfShape final : public btConcaveShape {
@@ -26,8 +46,10 @@ public:
     const SdfShape& sdf() const { return *sdf_; }
     void set(std::shared_ptr<const SdfShape> shape) {
         sdf_ = std::move(shape);
+        regions_.set(sdf_);
         ++revision_;
     }
+    const btConcaveShape& regions() const { return regions_; }
     uint32_t revision() const { return revision_; }  ///< how often it was another field
     const Pose& field_from_body() const { return field_from_body_; }
 
@@ -36,10 +58,12 @@ public:
     void setLocalScaling(const btVector3&) override {}
     const btVector3& getLocalScaling() const override { return one_; }
     const char* getName() const override { return "field"; }
-    void processAllTriangles(btTriangleCallback*, const btVector3&, const btVector3&) const override {}
+    /// Of the voxels that the box meets: see triangles_in().
+    void processAllTriangles(btTriangleCallback* callback, const btVector3& low, const btVector3& high) const override;
 
 private:
     std::shared_ptr<const SdfShape> sdf_;
+    BulletRegionsShape regions_;
     Pose field_from_body_;
     uint32_t revision_ = 0;
     btVector3 one_{1, 1, 1};

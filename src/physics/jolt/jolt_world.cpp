@@ -83,20 +83,25 @@ Ref<JPH::Shape> make_shape(const Convex& c) {
     return nullptr;
 }
 
-Ref<JPH::Shape> make_mesh(const Triangles& t) {
+Ref<JPH::Shape> make_mesh(std::span<const vec3> points, std::span<const uint32_t> indices) {
     VertexList vertices;
     IndexedTriangleList triangles;
-    for (const vec3 v : t.vertices) vertices.push_back({v.x, v.y, v.z});
-    for (size_t i = 0; i < t.indices.size(); i += 3)
-        triangles.push_back(IndexedTriangle(t.indices[i], t.indices[i + 1], t.indices[i + 2], 0));
+    for (const vec3 v : points) vertices.push_back({v.x, v.y, v.z});
+    for (size_t i = 0; i < indices.size(); i += 3)
+        triangles.push_back(IndexedTriangle(indices[i], indices[i + 1], indices[i + 2], 0));
     MeshShapeSettings settings(std::move(vertices), std::move(triangles));
     settings.mActiveEdgeCosThresholdAngle = -1;  // inner edges are found when bodies touch them (EIER, below)
     settings.mBuildQuality = MeshShapeSettings::EBuildQuality::FavorBuildSpeed;
     const JPH::Shape::ShapeResult made = settings.Create();
     if (made.HasError()) return nullptr;  // no triangle with an area
-    const Ref<JPH::Shape> shape = made.Get();
-    shape->SetUserData(reinterpret_cast<uint64>(&t));
-    return shape;
+    return made.Get();
+}
+
+std::shared_ptr<const void> make_region(const RegionMesh& mesh) {
+    if (mesh.own() == 0) return nullptr;
+    const Ref<JPH::Shape> shape = make_mesh(mesh.vertices, mesh.indices);
+    if (shape == nullptr || shape->GetSubShapeIDBitsRecursive() > kMeshBits) return nullptr;
+    return std::shared_ptr<const void>(shape.GetPtr(), [keep = shape](const void*) {});
 }
 
 class JoltWorld final : public World, private ContactListener {
@@ -154,8 +159,12 @@ protected:
             object->shape = new JoltSdfShape(*sdf);
         } else {
             object->triangles = std::get<std::shared_ptr<const Triangles>>(b.settings.shape);
-            object->shape = make_mesh(*object->triangles);
-            if (object->shape == nullptr) object->shape = new JoltSdfShape(object->triangles->solid);
+            object->shape = make_mesh(object->triangles->vertices, object->triangles->indices);
+            if (object->shape == nullptr) {
+                object->shape = new JoltSdfShape(object->triangles->solid);
+            } else {
+                object->shape->SetUserData(reinterpret_cast<uint64>(object->triangles.get()));
+            }
         }
         const bool fixed = b.settings.motion == Motion::Static, dynamic = b.settings.motion == Motion::Dynamic;
         BodyCreationSettings settings(object->shape, to_jolt(b.settings.pose.position),
@@ -274,6 +283,8 @@ protected:
         for (const Pair& p : before)
             if (rests(p.a) && rests(p.b)) touching_.push_back(p);
     }
+
+    GroundMesher::Build region_builder() const override { return make_region; }
 
     void collect(std::vector<Pair>& pairs) const override {
         const std::lock_guard lock(mutex_);

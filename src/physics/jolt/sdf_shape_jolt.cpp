@@ -3,6 +3,7 @@
 #include "physics/jolt/sdf_shape_jolt.h"
 
 #include "physics/facing.h"
+#include "physics/ground_contacts.h"
 #include "physics/sdf_collision.h"
 
 #include <Jolt/Physics/Collision/CastResult.h>
@@ -10,6 +11,7 @@
 #include <Jolt/Physics/Collision/CollideShape.h>
 #include <Jolt/Physics/Collision/CollideSoftBodyVertexIterator.h>
 #include <Jolt/Physics/Collision/CollisionDispatch.h>
+#include <Jolt/Physics/Collision/InternalEdgeRemovingCollector.h>
 #include <Jolt/Physics/Collision/PhysicsMaterial.h>
 #include <Jolt/Physics/Collision/RayCast.h>
 #include <Jolt/Physics/Collision/Shape/ConvexShape.h>
@@ -56,10 +58,63 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
     }
 }
 
-void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
-                    Mat44Arg transform2, const SubShapeIDCreator& id1, const SubShapeIDCreator& id2,
-                    const CollideShapeSettings& settings, CollideShapeCollector& collector, const ShapeFilter&) {
+// Hits on meshes of regions, of which those on aprons are let go.
+class OwnHits final : public CollideShapeCollector {
+public:
+    OwnHits(CollideShapeCollector& to, const Regions& regions, const Pose& ground_from_space, uint bits_before)
+        : CollideShapeCollector(to), to_(to), regions_(regions), pose_(ground_from_space), bits_(bits_before + 1) {}
+    void AddHit(const CollideShapeResult& hit) override {
+        SubShapeID id = hit.mSubShapeID2, rest;
+        (void)id.PopID(bits_, rest);
+        const Regions::Entry* e = regions_.numbered(rest.PopID(kRegionBits, id));
+        if (e == nullptr || !is_own(*e->mesh, pose_ * to_vec(hit.mContactPointOn2))) return;
+        to_.SetContext(GetContext());
+        to_.AddHit(hit);
+        UpdateEarlyOutFraction(to_.GetEarlyOutFraction());
+    }
+
+private:
+    CollideShapeCollector& to_;
+    const Regions& regions_;
+    Pose pose_;
+    uint bits_;
+};
+
+void collide_meshed(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg scale1, Vec3Arg scale2,
+                    Mat44Arg transform1, Mat44Arg transform2, const SubShapeIDCreator& id1,
+                    const SubShapeIDCreator& id2, const CollideShapeSettings& settings,
+                    CollideShapeCollector& collector, const ShapeFilter& filter) {
+    static thread_local std::vector<FieldContact> contacts;
+    const JoltSdfShape& ground = field_of(shape2);
+    const Pose world = world_of(ground, transform2), local = inverse(world) * pose_of(transform1);
+    const Convex& body = convex_of(shape1);
+    const bool triangles = collide_ground(ground.sdf(), body, local, settings.mMaxSeparationDistance, contacts);
+    add(contacts, world, false, id1, id2.PushID(0, 1), collector);
+    if (!triangles) return;
+    // All of them together, so that an edge between two regions is seen to be an inner one.
+    OwnHits own(collector, *ground.sdf().regions(), inverse(world), id2.GetNumBitsWritten());
+    InternalEdgeRemovingCollector inner(own, settings.mInternalEdgeRemovalVertexToleranceSq);
+    CollideShapeSettings all = settings;
+    all.mActiveEdgeMode = EActiveEdgeMode::CollideWithAll;
+    all.mCollectFacesMode = ECollectFacesMode::CollectFaces;
+    ground.sdf().regions()->each(
+        box_of(body, local).inflated(settings.mMaxSeparationDistance), [&](const Regions::Entry& e) {
+            if (e.mesh->made == nullptr) return;
+            CollisionDispatch::sCollideShapeVsShape(shape1, static_cast<const JPH::Shape*>(e.mesh->made.get()), scale1,
+                                                    scale2, transform1, transform2, id1,
+                                                    id2.PushID(1, 1).PushID(e.number, kRegionBits), all, inner, filter);
+        });
+    inner.Flush();
+}
+
+void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg scale1, Vec3Arg scale2,
+                    Mat44Arg transform1, Mat44Arg transform2, const SubShapeIDCreator& id1,
+                    const SubShapeIDCreator& id2, const CollideShapeSettings& settings,
+                    CollideShapeCollector& collector, const ShapeFilter& filter) {
     const CallInStep call;
+    if (field_of(shape2).sdf().regions() != nullptr)
+        return collide_meshed(shape1, shape2, scale1, scale2, transform1, transform2, id1, id2, settings, collector,
+                              filter);
     static thread_local std::vector<FieldContact> contacts;
     const Pose world = world_of(field_of(shape2), transform2);
     collide(field_of(shape2).sdf(), convex_of(shape1), inverse(world) * pose_of(transform1),
@@ -163,7 +218,9 @@ AABox JoltSdfShape::GetLocalBounds() const {
     return {to_jolt(box.min - center()), to_jolt(box.max - center())};
 }
 
-uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return kFacingBits; }
+uint JoltSdfShape::GetSubShapeIDBitsRecursive() const {
+    return sdf_->regions() != nullptr ? 1 + kRegionBits + kMeshBits : kFacingBits;
+}
 
 const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
 

@@ -70,6 +70,11 @@ private:
     std::shared_ptr<const SdfShape> sdf_;
 };
 
+// Parts of a field are numbered by the direction they face; of meshed ground, one bit tells triangles from the field, then come the number
+// of the region and its mesh's own.
+inline constexpr JPH::uint kRegionBits = 9, kMeshBits = 32 - 1 - kRegionBits;
+static_assert(kMostRegions <= 1u << kRegionBits);
+
 /// What a mesh is made of, likewise.
 inline const Triangles& triangles_of(const JPH::Shape* s) {
     return *reinterpret_cast<const Triangles*>(s->GetUserData());
