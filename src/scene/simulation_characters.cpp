@@ -39,11 +39,8 @@ Result<void> Simulation::show_characters() {
         edit.node.transform.position = n.position + vec3{0, 0.5f * n.height, 0};
         w.shown = edit.name;
         owned_.insert(edit.name);
-        live_->impl_->data.bodies.push_back({.id = w.id,
-                                             .edits = {edit.name},
-                                             .mesh = {},
-                                             .motion = SceneBody::Motion::Kinematic,
-                                             .numbers = {}});
+        live_->impl_->data.bodies.push_back(
+            {.id = w.id, .edits = {edit.name}, .mesh = {}, .motion = SceneBody::Motion::Kinematic, .numbers = {}});
         if (const auto added = live_->add(std::move(edit)); !added) return added.error();
     }
     return {};

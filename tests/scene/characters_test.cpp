@@ -113,8 +113,12 @@ TEST(Characters, SurviveTheirFloorBeingDugAndBuiltOver) {
         {"id": "floor", "shape": "box", "half_extents": [4, 0.5, 4], "position": [0, -0.5, 0]}],
       "characters": [{"id": "w", "position": [0, 0.01, 0]}]})");
     const std::vector<TimedCommand> edits = {
-        {1.0, "e", R"({"time": 1, "command": {"add": {"id": "hole", "shape": "cylinder", "half_height": 2, "radius": 1, "op": "subtract"}}})", 1},
-        {3.0, "e", R"({"time": 3, "command": {"add": {"id": "mound", "shape": "sphere", "radius": 1, "position": [0.2, -3, 0]}}})", 2}};
+        {1.0, "e",
+         R"({"time": 1, "command": {"add": {"id": "hole", "shape": "cylinder", "half_height": 2, "radius": 1, "op": "subtract"}}})",
+         1},
+        {3.0, "e",
+         R"({"time": 3, "command": {"add": {"id": "mound", "shape": "sphere", "radius": 1, "position": [0.2, -3, 0]}}})",
+         2}};
     for (const std::string& engine : engines()) {
         const json out = run(world, {.seconds = 6, .backend = engine, .edits = edits});
         EXPECT_NEAR(fall(walker(out, 60)), 0, 1e-3) << engine;
@@ -130,14 +134,16 @@ TEST(Characters, SurviveTheirFloorBeingDugAndBuiltOver) {
 }
 
 TEST(Characters, AreCapsulesInPictures) {
-    const World world = parsed(R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "floor", "shape": "box", "half_extents": [4, 0.5, 4]}],
+    const World world = parsed(
+        R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "floor", "shape": "box", "half_extents": [4, 0.5, 4]}],
       "characters": [{"id": "w", "position": [0, 2, 0]}, {"id": "v", "position": [1, 0.51, 0], "path": [{"time": 0, "direction": [0, 0, 1]}]}]})");
     for (const std::string& engine : engines()) {
         auto play = Play::start(world, {.backend = engine});
         ASSERT_TRUE(play);
         for (int i = 0; i < 30; ++i) ASSERT_TRUE(play->step());
         // What is dug after it came does not cut its picture.
-        ASSERT_TRUE(play->apply(R"({"add": {"id": "cut", "shape": "sphere", "position": [1, 2, 0.7], "op": "subtract"}})"));
+        ASSERT_TRUE(
+            play->apply(R"({"add": {"id": "cut", "shape": "sphere", "position": [1, 2, 0.7], "op": "subtract"}})"));
         ASSERT_TRUE(play->step());
         const auto frame = play->frame({.position = {0, 3, 8}});
         ASSERT_TRUE(frame);
@@ -150,10 +156,12 @@ TEST(Characters, AreCapsulesInPictures) {
 
 TEST(Characters, WhatIsWrongWithOneIsOneClearError) {
     const auto message = [](const std::string& character) {
-        const auto world = World::parse("{\"format\": 1,\n \"bodies\": [{\"id\": \"b\", \"edits\": [\"e\"]}],\n"
-                                        " \"edits\": [{\"id\": \"e\", \"shape\": \"sphere\"}],\n"
-                                        " \"characters\": [" + character + "]}",
-                                        "s.kiln.json");
+        const auto world = World::parse(
+            "{\"format\": 1,\n \"bodies\": [{\"id\": \"b\", \"edits\": [\"e\"]}],\n"
+            " \"edits\": [{\"id\": \"e\", \"shape\": \"sphere\"}],\n"
+            " \"characters\": [" +
+                character + "]}",
+            "s.kiln.json");
         return world ? std::string("no error") : world.error().message;
     };
     EXPECT_THAT(message(R"({"id": "w", "radius": 0})"),
@@ -170,9 +178,11 @@ TEST(Characters, WhatIsWrongWithOneIsOneClearError) {
     EXPECT_THAT(message(R"({"id": "w"}, {"id": "w"})"), HasSubstr("unique"));
     EXPECT_EQ(message(R"({"id": "w", "path": []})"), "no error");
     // Kept when it is saved.
-    const auto world = World::parse(R"({"format": 1, "characters": [{"id": "w", "speed": 3, "path": [{"time": 2}]}]})", "s");
+    const auto world =
+        World::parse(R"({"format": 1, "characters": [{"id": "w", "speed": 3, "path": [{"time": 2}]}]})", "s");
     ASSERT_TRUE(world);
-    EXPECT_EQ(json::parse(world->to_json())["characters"], json::parse(R"([{"id": "w", "speed": 3, "path": [{"time": 2}]}])"));
+    EXPECT_EQ(json::parse(world->to_json())["characters"],
+              json::parse(R"([{"id": "w", "speed": 3, "path": [{"time": 2}]}])"));
 }
 
 }  // namespace
