@@ -23,7 +23,8 @@ namespace {
 
 constexpr float kPartDensity = 1000;  // kg/m³, a body's default
 constexpr float kSettleSeconds = 2;   // a part asleep for so long is ground again
-constexpr float kReachVoxels = 8;     // edits so near to a region shape the surface in it, or how the part's values go on around it
+constexpr float kReachVoxels =
+    8;  // edits so near to a region shape the surface in it, or how the part's values go on around it
 
 Node region_node(const field::RegionMask& mask) {
     Node out;

@@ -48,13 +48,15 @@ TEST(Regions, WhatIsNoRegionIsToldAndNothingIsMadeOfIt) {
     for (size_t cut = 7; cut < good.size(); ++cut) EXPECT_FALSE(read_region(good.substr(0, cut))) << cut;
     EXPECT_FALSE(read_region(good + "AAAAAAAA"));
     EXPECT_FALSE(read_region(good.substr(0, good.size() - 1) + "*"));
-    for (const char* text : {"region:", "region:0:0,0,0:2,2,2:I", "region:nan:0,0,0:2,2,2:I", "region:1:0,0:2,2,2:I",
-                             "region:1:0,0,0:0,2,2:", "region:1:0,0,0:100000,100000,100000:I", "region:1:0,0,0:1,1,1000000:I",
-                             "region:1:99999999,0,0:2,2,2:I", "region:1:0,0,0:2,2,2:////////", "region:1:0,0,0:-2,2,2:I"})
+    for (const char* text :
+         {"region:", "region:0:0,0,0:2,2,2:I", "region:nan:0,0,0:2,2,2:I", "region:1:0,0:2,2,2:I",
+          "region:1:0,0,0:0,2,2:", "region:1:0,0,0:100000,100000,100000:I", "region:1:0,0,0:1,1,1000000:I",
+          "region:1:99999999,0,0:2,2,2:I", "region:1:0,0,0:2,2,2:////////", "region:1:0,0,0:-2,2,2:I"})
         EXPECT_FALSE(read_region(text)) << text;
     // In a scene it is an error with its place.
     const auto world = World::parse(R"({"format": 1,
- "edits": [{"id": "e", "shape": "mesh", "file": "region:1:0,0,0:2,2,2:*"}]})", "s.kiln.json");
+ "edits": [{"id": "e", "shape": "mesh", "file": "region:1:0,0,0:2,2,2:*"}]})",
+                                    "s.kiln.json");
     ASSERT_FALSE(world);
     EXPECT_THAT(world.error().message, testing::AllOf(HasSubstr("s.kiln.json:2:"), HasSubstr("region")));
 }
@@ -63,9 +65,9 @@ TEST(Regions, AShapeHasTheDistanceOfTheMask) {
     for (const float share : {0.9f, 0.3f}) {
         const auto mask = random_mask(7, {17, 12, 23}, share);
         const field::RegionField field(mask);
-        auto world = World::parse(R"({"format": 1, "edits": [{"id": "e", "shape": "mesh", "file": ")" + region_text(mask) +
-                                      R"("}]})",
-                                  "s.kiln.json");
+        auto world = World::parse(
+            R"({"format": 1, "edits": [{"id": "e", "shape": "mesh", "file": ")" + region_text(mask) + R"("}]})",
+            "s.kiln.json");
         ASSERT_TRUE(world) << world.error().message;
         std::mt19937 rng(3);
         const Box3 box = field.bounds().inflated(0.3f);
