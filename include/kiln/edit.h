@@ -113,7 +113,7 @@ struct Node {
     Kind kind = Kind::Shape;
     Shape shape{};
     ObjectId object{};
-    Op op = Op::Union;                 ///< Fold: combines the children from left to right (never Paint)
+    Op op = Op::Union;                 ///< Fold: combines the children from left to right
     float blend_radius = 0;            ///< Fold: in the node's own units
     float material_blend_radius = -1;  ///< Fold: likewise, for materials; negative: same as blend_radius
     std::vector<uint32_t> children{};  ///< Fold: indices into Object::nodes

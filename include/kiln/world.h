@@ -259,6 +259,9 @@ public:
     double dropped_seconds() const { return dropped_; }
     /// A change of the world's own edits, {"add": EDIT} and the like, before the next step.
     Result<void> apply(const std::string& command, const std::string& name = "command");
+    /// Makes another world, or the one that was played, which must be as it was at the start, what this one has become: commands, parts
+    /// that came loose (as `dynamic` edits where they are, in flight too) and those that settled. One step of its history.
+    Result<void> keep(World& world) const;
     /// The world with its bodies where they are: after step() those of the last step, after advance() as far between the last two as time
     /// has gone on. Each frame moves on from the one before (motion).
     Result<Frame> frame(const Camera& camera, const PlayLines& lines = {});

@@ -126,21 +126,17 @@ std::vector<float> distances_to(const std::vector<bool>& set, bool member, ivec3
     return f;
 }
 
-float to_box(const Box3& box, vec3 p) {
-    const vec3 away = max(max(box.min - p, p - box.max), vec3{});
-    return length(away);
-}
-
 }  // namespace
 
-RegionField::RegionField(ivec3 first, ivec3 size, float voxel_size, const std::vector<bool>& inside)
-    : low_(place_of(first, voxel_size)), size_(size), voxel_size_(voxel_size) {
-    const vec3 extent{float(size.x - 1), float(size.y - 1), float(size.z - 1)};
-    box_ = {low_, low_ + extent * voxel_size};
-    const std::vector<float> out = distances_to(inside, true, size), in = distances_to(inside, false, size);
+RegionField::RegionField(const RegionMask& mask)
+    : low_(place_of(mask.first, mask.voxel_size)), size_(mask.size), voxel_size_(mask.voxel_size) {
+    const std::vector<bool>& inside = mask.inside;
+    const ivec3 last = mask.first + mask.size - ivec3{1, 1, 1};
+    box_ = {low_, place_of(last, voxel_size_)};
+    const std::vector<float> out = distances_to(inside, true, size_), in = distances_to(inside, false, size_);
     samples_.resize(inside.size());
     // Neighbours differ by at most a voxel along an axis: the interpolant's slope is at most the root of 3.
-    const float k = voxel_size / std::sqrt(3.0f);
+    const float k = voxel_size_ / std::sqrt(3.0f);
     for (size_t i = 0; i < samples_.size(); ++i) samples_[i] = k * (inside[i] ? 0.5f - in[i] : out[i] - 0.5f);
 }
 
@@ -353,94 +349,12 @@ std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after
         for (size_t i = 0; i < total; ++i)
             mine[i] = mine[i] || (!rest[i] && to_mine[i] <= float(reach) && to_mine[i] < to_rest[i]);
         LoosePart part;
-        part.region = std::make_shared<const RegionField>(from, n, h, mine);
+        part.region = {from, n, h, std::move(mine)};
         part.box = Box3{place_of(low, h), place_of(high, h)}.inflated(h);
         part.points = w.points.size();
         out.push_back(std::move(part));
     }
     return out;
-}
-
-float LayeredField::distance(vec3 p) const {
-    vec3 gradient;
-    return distance(p, gradient);
-}
-
-float LayeredField::distance(vec3 p, vec3& gradient) const {
-    float d = base_->distance(p, gradient);
-    for (const Layer& layer : layers_) {
-        // A layer changes a value only where it is nearer than the value is large.
-        const float far = to_box(layer.box, p);
-        if (layer.adds ? far > d : far > 0 && (d >= 0 || far > -d)) continue;
-        vec3 g;
-        if (layer.adds) {
-            const quat back = conjugate(layer.rotation);
-            const float part = layer.field->distance(rotate(back, p - layer.position), g);
-            if (part < d) d = part, gradient = rotate(layer.rotation, g);
-        } else {
-            const float cut = -layer.field->distance(p, g);
-            if (cut > d) d = cut, gradient = -g;
-        }
-    }
-    return d;
-}
-
-void LayeredField::distances(const sdf::Points& points, float* out) const {
-    base_->distances(points, out);
-    for (int i = 0; i < points.count; ++i) {
-        const vec3 p{points.x[i], points.y[i], points.z[i]};
-        const bool near = std::any_of(layers_.begin(), layers_.end(),
-                                      [&](const Layer& l) { return to_box(l.box, p) <= std::abs(out[i]); });
-        if (near) out[i] = distance(p);
-    }
-}
-
-uint32_t LayeredField::material(vec3 p) const {
-    for (size_t i = layers_.size(); i-- > 0;) {
-        const Layer& layer = layers_[i];
-        if (!layer.adds || to_box(layer.box, p) > 0) continue;
-        const vec3 local = rotate(conjugate(layer.rotation), p - layer.position);
-        if (layer.field->distance(local) < base_->distance(p)) return layer.field->material(local);
-    }
-    return base_->material(p);
-}
-
-Box3 LayeredField::bounds() const {
-    Box3 out = base_->bounds();
-    for (const Layer& layer : layers_)
-        if (layer.adds) out = box_union(out, layer.box);
-    return out;
-}
-
-PartField::PartField(std::shared_ptr<const SdfField> base, std::shared_ptr<const SdfField> region, vec3 origin,
-                     const Box3& box)
-    : base_(std::move(base)), region_(std::move(region)), origin_(origin), box_{box.min - origin, box.max - origin} {}
-
-float PartField::distance(vec3 p) const {
-    return std::max(base_->distance(p + origin_), region_->distance(p + origin_));
-}
-
-float PartField::distance(vec3 p, vec3& gradient) const {
-    vec3 g;
-    const float d = base_->distance(p + origin_, gradient), r = region_->distance(p + origin_, g);
-    if (r > d) gradient = g;
-    return std::max(d, r);
-}
-
-void PartField::distances(const sdf::Points& points, float* out) const {
-    constexpr int kMost = 64;
-    std::array<float, kMost> x, y, z, r;
-    for (int first = 0; first < points.count; first += kMost) {
-        const int n = std::min(kMost, points.count - first);
-        for (int i = 0; i < n; ++i) {
-            x[size_t(i)] = points.x[first + i] + origin_.x;
-            y[size_t(i)] = points.y[first + i] + origin_.y;
-            z[size_t(i)] = points.z[first + i] + origin_.z;
-        }
-        base_->distances({x.data(), y.data(), z.data(), n}, out + first);
-        region_->distances({x.data(), y.data(), z.data(), n}, r.data());
-        for (int i = 0; i < n; ++i) out[first + i] = std::max(out[first + i], r[size_t(i)]);
-    }
 }
 
 }  // namespace kiln::field

@@ -10,21 +10,27 @@
 #include "field/sdf_field.h"
 #include "field/words.gpu.h"
 
-#include <memory>
 #include <vector>
 
 namespace kiln::field {
 
-/// Distance to a mask of lattice points, each with its voxel around it; trilinear between samples, divided by its steepest slope. Any thread.
+/// Lattice points, `inside` by (z * size.y + y) * size.x + x; the outermost are outside.
+struct RegionMask {
+    ivec3 first, size;
+    float voxel_size = 0;
+    std::vector<bool> inside;
+};
+
+/// Distance to a mask, each point with its voxel around it; trilinear between samples, divided by its steepest slope. Any thread.
 class RegionField final : public SdfField {
 public:
-    /// `inside` by (z * size.y + y) * size.x + x; its outermost points are outside.
-    RegionField(ivec3 first, ivec3 size, float voxel_size, const std::vector<bool>& inside);
+    explicit RegionField(const RegionMask& mask);
 
     float distance(vec3 p) const override;
     float distance(vec3 p, vec3& gradient) const override;
     void distances(const sdf::Points& points, float* out) const override;
     Box3 bounds() const override { return box_; }  ///< of the samples
+    const std::vector<float>& samples() const { return samples_; }
 
 private:
     vec3 low_;
@@ -35,7 +41,7 @@ private:
 };
 
 struct LoosePart {
-    std::shared_ptr<const RegionField> region;
+    RegionMask region;
     Box3 box;           ///< of its points, a voxel around it
     size_t points = 0;  ///< lattice points in it
 };
@@ -50,47 +56,5 @@ struct LooseOptions {
 /// The largest of the parts that were one before stays. By place: the part with the least first point first.
 std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after, const Box3& changed,
                                    const LooseOptions& options);
-
-/// A field with parts cut out of it, and parts put to it where they came to rest, in the order that it happened. Any thread.
-class LayeredField final : public SdfField {
-public:
-    struct Layer {
-        std::shared_ptr<const SdfField> field;  ///< a region that is taken away, or a part
-        bool adds = false;
-        vec3 position{};  ///< of a part
-        quat rotation{};
-        Box3 box;  ///< in the world
-    };
-    LayeredField(std::shared_ptr<const SdfField> base, std::vector<Layer> layers)
-        : base_(std::move(base)), layers_(std::move(layers)) {}
-    float distance(vec3 p) const override;
-    float distance(vec3 p, vec3& gradient) const override;
-    void distances(const sdf::Points& points, float* out) const override;
-    uint32_t material(vec3 p) const override;
-    Box3 bounds() const override;
-    size_t cost() const override { return base_->cost() + 50 * layers_.size(); }
-
-private:
-    std::shared_ptr<const SdfField> base_;
-    std::vector<Layer> layers_;
-};
-
-/// What of a field lies in a region, in a frame of its own whose origin is at `origin`. Any thread.
-class PartField final : public SdfField {
-public:
-    PartField(std::shared_ptr<const SdfField> base, std::shared_ptr<const SdfField> region, vec3 origin,
-              const Box3& box);
-    float distance(vec3 p) const override;
-    float distance(vec3 p, vec3& gradient) const override;
-    void distances(const sdf::Points& points, float* out) const override;
-    uint32_t material(vec3 p) const override { return base_->material(p + origin_); }
-    Box3 bounds() const override { return box_; }
-    size_t cost() const override { return base_->cost() + 50; }
-
-private:
-    std::shared_ptr<const SdfField> base_, region_;
-    vec3 origin_;
-    Box3 box_;
-};
 
 }  // namespace kiln::field

@@ -46,6 +46,18 @@ std::optional<physics::Convex> convex_of(std::span<const Edit> edits) {
     }
 }
 
+std::vector<physics::Surface> surfaces_of(const SceneData& data) {
+    std::vector<physics::Surface> out{{data.physics.friction, data.physics.restitution}};
+    for (size_t i = 0; i < data.materials.size(); ++i) {
+        const SceneData::Silent silent = i < data.silent.size() ? data.silent[i] : SceneData::Silent{};
+        const Material& m = data.materials[i].second;
+        out.push_back({silent.friction ? data.physics.friction : m.friction,
+                       silent.restitution ? data.physics.restitution : m.restitution});
+    }
+    if (out.size() == 1) out.clear();
+    return out;
+}
+
 std::vector<Edit> ground_of(const World::Impl& world, const std::unordered_set<std::string>& owned) {
     std::vector<Edit> out;
     world.edits.each([&](uint32_t slot) {

@@ -19,6 +19,8 @@ namespace kiln::scene {
 
 /// The exact convex shape of a body of one edit, where it has one.
 std::optional<physics::Convex> convex_of(std::span<const Edit> edits);
+/// By material number, the scene's own where a material says nothing; empty where there are no materials.
+std::vector<physics::Surface> surfaces_of(const SceneData& data);
 /// The world's list without the edits of bodies.
 std::vector<Edit> ground_of(const World::Impl& world, const std::unordered_set<std::string>& owned);
 Result<std::shared_ptr<const field::ProgramField>> field_of(World::Impl& world, std::span<const Edit> edits);

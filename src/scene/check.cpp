@@ -188,8 +188,6 @@ std::optional<Error> check_object(const Object& object, size_t objects, size_t m
         const Node& node = object.nodes[n];
         if (auto f = check_node(node, objects, materials)) return f;
         if (node.kind != Node::Kind::Fold) continue;
-        if (node.op == Op::Paint)
-            return fault("paint is an operation of edits, not of trees; use union, subtract or intersect");
         if (node.children.empty()) return fault("a fold without children; give it at least one");
         if (auto f = check_length("blend_radius", node.blend_radius, true)) return f;
         if (auto f = check_length("material_blend_radius", node.material_blend_radius, false)) return f;

@@ -108,7 +108,7 @@ constexpr KeyRow kEditRows[] = {
 };
 constexpr KeyRow kNodeRows[] = {
     KILN_NODE_ROWS,
-    choice("op", std::span(kOps).first(3), "with children: how they fold, from left to right; left out: union"),
+    choice("op", kOps, "with children: how they fold, from left to right; left out: union"),
     number("blend_radius", kKept, 0, "m", ">= 0", "with children: of the fold, in the object's units"),
     number("material_blend_radius", kKept, 0, "m", ">= 0",
            "with children: the same for materials; left out: blend_radius"),

@@ -2,6 +2,8 @@
 
 #include "scene/heights.h"
 
+#include "scene/region.h"
+
 #include "sdf/expression_code.h"
 #include "sdf/tables.h"
 
@@ -62,6 +64,15 @@ Result<uint32_t> mesh_number(const Shape& shape, const std::string& folder, Grid
         bool& claimed = grids.mesh_notes[found->second].report.claimed_closed;
         claimed = claimed || fields.closed != 0;
         return found->second;
+    }
+    if (is_region(shape.data)) {
+        const auto mask = read_region(shape.data);
+        if (!mask) return mask.error();
+        const auto index = uint32_t(grids.meshes.size());
+        grids.meshes.push_back(region_grid(*mask));
+        grids.mesh_notes.push_back({shape.data, key.second, {}});
+        grids.by_mesh.emplace(key, index);
+        return index;
     }
     const std::string path = in_folder(folder, shape.data);
     const auto mesh = model::read(path);

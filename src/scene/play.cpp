@@ -57,12 +57,9 @@ void Simulation::move_meshes(Frame& frame, float between) {
 Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayLines& shown) {
     const auto world = live();
     if (!world) return world.error();
-    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
-    for (size_t i = 0; i < bodies.size(); ++i) {
-        if (bodies[i].edits.empty()) continue;
-        const auto edit = (*world)->find_edit(bodies[i].edits.front());
+    for (const Member& m : members_) {
+        const auto edit = m.edit.empty() ? std::nullopt : (*world)->find_edit(m.edit);
         if (!edit) continue;
-        const Member& m = members_[i];
         if (auto moved = (*world)->move(*edit, blend(m.before, state(m).pose, between)); !moved) return moved.error();
     }
     for (const Walker& w : walkers_) {
@@ -127,6 +124,8 @@ double Play::time() const { return simulation_->time(); }
 Result<void> Play::apply(const std::string& command, const std::string& name) {
     return simulation_->command_now(command, name);
 }
+
+Result<void> Play::keep(World& world) const { return simulation_->keep(world); }
 
 Result<Frame> Play::frame(const Camera& camera, const PlayLines& lines) {
     return simulation_->frame(camera, between_, lines);

@@ -203,8 +203,6 @@ bool NodeReader::node(JsonIndex at, Node& out, Edit* edit, bool partly) {
             }
         } else if (key == "op") {
             int op = 0;
-            if (!edit && doc.text(m) == "paint")
-                return in_.fail(m, "paint is an operation of edits, not of trees; use union, subtract or intersect");
             ok = in_.choice(m, row->choices, &op);
             (edit ? edit->op : out.op) = Op(op);
         } else if (key == "blend_radius") {

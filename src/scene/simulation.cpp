@@ -18,22 +18,14 @@ namespace kiln::scene {
 namespace {
 
 constexpr const char* kWorldName = "world";
-constexpr float kPartDensity = 1000;  // kg/m³, a body's default
-constexpr float kSettleSeconds = 2;   // a part asleep for so long is ground again
-constexpr int kMeshResolution = 64;   // cells along the longest side of a body's mesh
+constexpr int kMeshResolution = 64;  // cells along the longest side of a body's mesh
 constexpr const char* kBodysOwn = "is a body's; commands change the world's own edits while bodies run";
 
-// The scene's own where no material says.
-std::vector<physics::Surface> surfaces_of(const SceneData& data) {
-    std::vector<physics::Surface> out{{data.physics.friction, data.physics.restitution}};
-    for (size_t i = 0; i < data.materials.size(); ++i) {
-        const SceneData::Silent silent = i < data.silent.size() ? data.silent[i] : SceneData::Silent{};
-        const Material& m = data.materials[i].second;
-        out.push_back({silent.friction ? data.physics.friction : m.friction,
-                       silent.restitution ? data.physics.restitution : m.restitution});
-    }
-    if (out.size() == 1) out.clear();
-    return out;
+// The command of a line of timed ones, as it is written there.
+std::string command_in(const std::string& line) {
+    const auto doc = JsonDocument::parse(line, "command");
+    const auto at = doc ? doc->find(0, "command") : std::nullopt;
+    return at ? std::string(doc->source(*at)) : std::string();
 }
 
 }  // namespace
@@ -41,6 +33,13 @@ std::vector<physics::Surface> surfaces_of(const SceneData& data) {
 Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const SimulateSettings& settings) {
     std::unique_ptr<Simulation> out(new Simulation(start));
     const SceneData& data = start.impl_->data;
+    // The ground is one too.
+    if (const size_t count = data.bodies.size() + data.characters.size(); count >= physics::World::kMostBodies) {
+        const std::string what = formatted("{} bodies and characters; there is room for {}, leave some out", count,
+                                           physics::World::kMostBodies - 1);
+        return out->fault(data.bodies.empty() ? data.characters.front().place : data.bodies.front().place, "bodies",
+                          what);
+    }
     const int threads = settings.threads > 0 ? settings.threads : std::max(1, int(std::thread::hardware_concurrency()));
     auto world = physics::make_world(settings.backend, {.gravity = data.physics.gravity, .threads = threads});
     if (!world) return world.error();
@@ -49,12 +48,10 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
     out->commands_ = settings.edits;
     for (const SceneBody& b : data.bodies) out->owned_.insert(b.edits.begin(), b.edits.end());
     out->edits_ = ground_of(*start.impl_, out->owned_);
-    auto list = field_of(*start.impl_, out->edits_);
-    if (!list) return list.error();
     out->voxel_size_ = start.impl_->resolution(*start.impl_->compiled(), start.field_settings).voxel_size;
     out->near_ = 8 * out->voxel_size_;
     out->mesh_voxel_ = settings.mesh_ground ? out->voxel_size_ : 0;
-    if (auto done = out->set_ground(std::move(*list), {}); !done) return done.error();
+    if (auto done = out->set_ground({}); !done) return done.error();
     if (auto done = out->add_bodies(settings); !done) return done.error();
     if (auto done = out->add_triggers(); !done) return done.error();
     if (auto done = out->add_characters(); !done) return done.error();
@@ -78,7 +75,7 @@ Result<void> Simulation::add(const physics::BodySettings& body, std::string_view
     physics::MassProperties mass;
     mass.mass = world_->mass(*id);
     mass.center = world_->center_of_mass(*id);
-    members_.push_back({std::string(name), *id, mass, body.pose});
+    members_.push_back({.id = std::string(name), .body = *id, .mass = mass, .before = body.pose});
     names_.emplace(*id, name);
     return {};
 }
@@ -90,10 +87,10 @@ std::shared_ptr<const physics::SdfShape> Simulation::ground_shape(const Box3& ch
     return physics::SdfShape::fixed(ground_, bricks_);
 }
 
-Result<void> Simulation::set_ground(std::shared_ptr<const field::ProgramField> list, const Box3& changed) {
-    list_ = std::move(list);
-    ground_ = cuts_.empty() ? std::shared_ptr<const field::SdfField>(list_)
-                            : std::make_shared<const field::LayeredField>(list_, cuts_);
+Result<void> Simulation::set_ground(const Box3& changed) {
+    auto list = field_of(live_ ? *live_->impl_ : *start_.impl_, edits_);
+    if (!list) return list.error();
+    ground_ = std::move(*list);
     if (ground_body_) {
         world_->set_field(*ground_body_, ground_shape(changed), changed);
         return {};
@@ -159,6 +156,7 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
             }
         }
         if (auto added = add(s, body.id); !added) return wrong(added.error().message);
+        if (!body.edits.empty()) members_.back().edit = body.edits.front();
     }
     return {};
 }
@@ -228,6 +226,10 @@ std::optional<std::string> Simulation::changed_body() const {
             if (!same) return name;
         }
     }
+    for (const Part& part : loose_) {
+        const uint32_t has = after.find(std::string_view(part.placed.name));
+        if (has == EditList::kNone || !(*after[has].edit == part.placed)) return part.placed.name;
+    }
     return std::nullopt;
 }
 
@@ -236,9 +238,12 @@ Result<void> Simulation::command_now(const std::string& command, const std::stri
     if (!world) return world.error();
     History history = (*world)->history();
     if (auto applied = (*world)->apply(command, name); !applied) return applied;
-    changed_ = true;
     const auto body = changed_body();
-    if (!body) return {};
+    if (!body) {
+        changed_ = true;
+        made_.push_back(command);
+        return {};
+    }
     if (const auto undone = history.undo(); !undone) return undone.error();
     return Error{formatted("{}: \"{}\" {}", name, *body, kBodysOwn), ErrorKind::Input};
 }
@@ -253,98 +258,9 @@ Result<void> Simulation::apply_commands() {
         changed_ = true;
         if (const auto body = changed_body())
             return Error{formatted("{}:{}: \"{}\" {}", command.file, command.line, *body, kBodysOwn), ErrorKind::Input};
+        made_.push_back(command_in(command.text));
     }
     return std::exchange(changed_, false) ? change_ground() : Result<void>();
-}
-
-// The ground becomes what live_ has, and what that cuts loose becomes bodies.
-Result<void> Simulation::change_ground() {
-    std::vector<Edit> there = ground_of(*live_->impl_, owned_);
-    const auto box = changed_box(*live_->impl_, edits_, there);
-    if (!box) return box.error();
-    edits_ = std::move(there);
-    if (auto done = cut_settled(); !done) return done;
-    auto list = field_of(*live_->impl_, edits_);
-    if (!list) return list.error();
-    const std::shared_ptr<const field::SdfField> before = ground_;
-    if (auto done = set_ground(*list, *box); !done) return done;
-    // What the commands cut loose.
-    const auto parts = field::loose_parts(*before, *ground_, *box, {.voxel_size = voxel_size_});
-    for (const field::LoosePart& part : parts) {
-        // Frozen: the ground as it is now, within the part's region.
-        const vec3 origin = part.box.center();
-        auto frozen = std::make_shared<const field::PartField>(ground_, part.region, origin, part.box);
-        auto shape = physics::SdfShape::moving(frozen, field::BrickField::of_body(frozen, voxel_size_));
-        if (!shape) continue;  // a crumb too thin to have a volume: it stays
-        const SceneData& data = start_.impl_->data;
-        const auto added = add({.shape = std::move(*shape),
-                                .pose = {origin, {}},
-                                .density = kPartDensity,
-                                .friction = data.physics.friction,
-                                .restitution = data.physics.restitution,
-                                .surfaces = surfaces_of(data)},
-                               formatted("part{}", ++parts_));
-        if (!added) return added;
-        loose_.push_back({members_.size() - 1, frozen});
-        cuts_.push_back({part.region, false, {}, {}, part.region->bounds()});
-        if (auto done = set_ground(*list, part.region->bounds()); !done) return done;
-    }
-    return {};
-}
-
-// Parts that have slept long enough are ground again, where they lie.
-Result<void> Simulation::settle_parts() {
-    const int enough = std::max(1, int(std::lround(kSettleSeconds / seconds_)));
-    Box3 changed;
-    for (Part& part : loose_) {
-        Member& m = members_[part.member];
-        const physics::BodyState state = world_->state(m.body);
-        part.asleep = state.asleep ? part.asleep + 1 : 0;
-        if (part.asleep < enough) continue;
-        m.rest = state;
-        const Box3 own = part.field->bounds();
-        Box3 box;
-        for (int corner = 0; corner < 8; ++corner) {
-            const vec3 p =
-                state.pose * vec3{(corner & 1) != 0 ? own.max.x : own.min.x, (corner & 2) != 0 ? own.max.y : own.min.y,
-                                  (corner & 4) != 0 ? own.max.z : own.min.z};
-            box = box_union(box, {p, p});
-        }
-        settled_.push_back({cuts_.size(), part.field, state.pose, edits_});
-        cuts_.push_back({part.field, true, state.pose.position, state.pose.rotation, box});
-        changed = box_union(changed, box);
-        world_->remove(m.body);
-    }
-    if (changed.empty()) return {};
-    std::erase_if(loose_, [&](const Part& part) { return members_[part.member].rest.has_value(); });
-    return set_ground(list_, changed);
-}
-
-// What is dug after a part has settled is dug out of the part too: in its own frame.
-Result<void> Simulation::cut_settled() {
-    for (const Settled& part : settled_) {
-        const physics::Pose local = inverse(part.pose);
-        std::vector<Edit> digs;
-        for (const Edit& e : edits_) {
-            if (e.op != Op::Subtract || std::find(part.before.begin(), part.before.end(), e) != part.before.end())
-                continue;
-            digs.push_back(e);
-            const physics::Pose frame = local * frame_of(e);
-            digs.back().node.transform.position = frame.position;
-            digs.back().node.transform.rotation = frame.rotation;
-            digs.back().op = Op::Union;
-        }
-        std::shared_ptr<const field::SdfField> left = part.field;
-        if (!digs.empty()) {
-            auto dug = field_of(*live_->impl_, digs);
-            if (!dug) return dug.error();
-            const Box3 box = (*dug)->bounds();
-            left = std::make_shared<const field::LayeredField>(
-                part.field, std::vector<field::LayeredField::Layer>{{std::move(*dug), false, {}, {}, box}});
-        }
-        cuts_[part.layer].field = std::move(left);
-    }
-    return {};
 }
 
 Result<void> Simulation::step() {

@@ -31,6 +31,8 @@ public:
     Result<void> step();
     /// A command, {"add": EDIT} and the like, whose change comes before the next step; refused, it changes nothing.
     Result<void> command_now(const std::string& command, const std::string& name);
+    /// Makes another world, as it was at the start, what this one has become: commands, what came loose, and where that is. One step.
+    Result<void> keep(World& world) const;
     /// The world with its bodies between where they were before the last step (0) and where they are (1).
     Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines);
 
@@ -44,6 +46,7 @@ public:
         std::string id;
         physics::BodyId body;
         physics::MassProperties mass{};
+        std::string edit{};      ///< by which the live world moves it; empty: by none
         physics::Pose before{};  ///< the last step
         std::optional<physics::BodyState>
             rest{};  ///< of a part that has settled back into the world: it is no body any more
@@ -86,10 +89,13 @@ private:
     std::optional<std::string> changed_body() const;
     Result<void> apply_commands();
     Result<void> change_ground();
+    /// Makes a part of the ground a body; nothing where it has no volume.
+    Result<bool> cut_loose(const field::LoosePart& part);
     Result<void> settle_parts();
-    Result<void> cut_settled();
-    /// The world's list is this now, but for what came loose; it differs from what was there in `changed`.
-    Result<void> set_ground(std::shared_ptr<const field::ProgramField> list, const Box3& changed);
+    /// A change of the live world, which keep() tells.
+    Result<void> change(const CommandView& command);
+    /// The ground is what the live world has now; it differs from what was there in `changed`.
+    Result<void> set_ground(const Box3& changed);
     std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
     Result<void> add(const physics::BodySettings& body, std::string_view name);
     Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
@@ -98,7 +104,7 @@ private:
     std::unique_ptr<physics::World> world_;
     physics::Triggers triggers_;
     std::vector<std::string> trigger_names_;  // by index
-    std::unordered_set<std::string> owned_;   // edits of bodies
+    std::unordered_set<std::string> owned_;   // edits of bodies, of parts that are loose and of characters
     std::vector<Member> members_;
     std::vector<Walker> walkers_;
     std::map<physics::BodyId, std::string> names_;  // also of those that are no more
@@ -108,32 +114,25 @@ private:
 
     // The ground.
     std::vector<Edit> edits_;
-    std::shared_ptr<const field::ProgramField> list_;
-    std::shared_ptr<const field::SdfField> ground_;  // the list, with the parts that came loose cut out and put to it
+    std::shared_ptr<const field::ProgramField> ground_;
     std::shared_ptr<const field::BrickField> bricks_;
-    std::vector<field::LayeredField::Layer> cuts_;
     std::optional<physics::BodyId> ground_body_;
     float voxel_size_ = 0, near_ = 0;  // metres
     float mesh_voxel_ = 0;             // metres; 0: bodies touch the field
     struct Part {
         size_t member;
-        std::shared_ptr<const field::PartField> field;
+        Edit placed;     // of the live world
+        Box3 own;        // in its frame
         int asleep = 0;  // steps
     };
     std::vector<Part> loose_;  // those that have not settled
-    struct Settled {
-        size_t layer;  // of cuts_
-        std::shared_ptr<const field::PartField> field;
-        physics::Pose pose;
-        std::vector<Edit> before;  // the list when it settled
-    };
-    std::vector<Settled> settled_;
     int parts_ = 0;
 
     // Commands.
     std::vector<TimedCommand> commands_;
     size_t done_ = 0;
-    bool changed_ = false;       // live_, since the ground was made from it
+    bool changed_ = false;           // live_, since the ground was made from it
+    std::vector<std::string> made_;  // of live_, in order
     std::optional<World> live_;  // the world as they change it, and as pictures see it; made when it is first needed
     std::vector<Transform> meshes_shown_;  // by SceneData::meshes, in the last frame
     double time_shown_ = 0;

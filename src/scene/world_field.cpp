@@ -3,6 +3,7 @@
 
 #include "scene/exact.h"
 #include "scene/framing.h"
+#include "scene/region.h"
 #include "scene/suggest.h"
 #include "scene/world_impl.h"
 
@@ -403,6 +404,7 @@ std::string World::inspect_json() const {
     if (!impl_->meshes.faults.empty()) out["faults"] = impl_->meshes.faults;
     Json meshes = Json::array();
     for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes) {
+        if (scene::is_region(note.file)) continue;
         const model::BakeReport& r = note.report;
         meshes.push_back({{"file", note.file},
                           {"resolution", note.resolution},
@@ -444,7 +446,7 @@ std::string World::inspect_json() const {
 std::vector<std::string> World::model_notes() const {
     std::vector<std::string> out;
     for (const scene::Grids::MeshNote& note : impl_->grids.mesh_notes)
-        out.push_back(formatted("{}: {}", note.file, note.report.sentence()));
+        if (!scene::is_region(note.file)) out.push_back(formatted("{}: {}", note.file, note.report.sentence()));
     out.insert(out.end(), impl_->meshes.notes.begin(), impl_->meshes.notes.end());
     return out;
 }

@@ -102,7 +102,7 @@ private:
 // less than their operands d and (d, e), blended or not.
 Hull fold_bounds(const Node& node, const std::vector<NodeBounds>& nodes) {
     const NodeBounds& first = nodes[node.children[0]];
-    if (node.op == Op::Subtract) return {first.parent, first.rate};
+    if (node.op == Op::Subtract || node.op == Op::Paint) return {first.parent, first.rate};
     if (node.op == Op::Intersect) {
         Faces faces(first);
         for (size_t i = 1; i < node.children.size(); ++i) faces.intersect(nodes[node.children[i]]);
@@ -377,8 +377,6 @@ private:
         uint64_t leaves = 1;
         if (node.kind == Node::Kind::Fold) {
             if (node.children.empty()) return fail(fault_, where_, "a node with `op` needs at least one child");
-            if (node.op == Op::Paint)
-                return fail(fault_, where_, "paint is not an operation of trees; use union, subtract or intersect");
             hull = fold_bounds(node, *nodes);
             leaves = 0;
             for (uint32_t child : node.children) leaves += (*nodes)[child].leaves;

@@ -56,6 +56,23 @@ TEST(Characters, WalkAsTheirPathWishesAndStand) {
     }
 }
 
+TEST(Characters, JumpOnceAsHighAsTheFormulaSays) {
+    const World world = parsed(R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}],
+      "characters": [{"id": "w", "position": [0, 0.01, 0], "path": [{"time": 0.5, "jump": 3}]}]})");
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 3, .backend = engine});
+        float high = 0;
+        int flights = 0;
+        for (size_t i = 10; i < 181; ++i) {
+            high = std::max(high, place(walker(out, i)).y);
+            flights += walker(out, i)["floor"].is_null() && !walker(out, i - 1)["floor"].is_null();
+        }
+        EXPECT_NEAR(high, 3 * 3 / (2 * 9.81f), 0.05f) << engine;
+        EXPECT_EQ(flights, 1) << engine;
+        EXPECT_EQ(walker(out, 180)["floor"], "world") << engine;
+    }
+}
+
 // A course of a hill, a step, a wall and a jump.
 TEST(Characters, WalkAlikeOnEveryEngineAndForAnyNumberOfThreads) {
     const World world = parsed(R"({"format": 1, "edits": [

@@ -143,8 +143,6 @@ INSTANTIATE_TEST_SUITE_P(
         BadScene{with_object("\"a\": {\"children\": [{\"shape\": \"sphere\", \"op\": \"union\"}]}"),
                  "objects.a.children[0].op: ", "stands on the node with \"children\"", "move it"},
         BadScene{with_object("\"a\": {\"children\": []}"), "objects.a.children: ", "no children", "at least one"},
-        BadScene{with_object("\"a\": {\"op\": \"paint\", \"children\": [{\"shape\": \"sphere\"}]}"),
-                 "objects.a.op: ", "paint", "union, subtract or intersect"},
         BadScene{with_object("\"\": {\"shape\": \"sphere\"}", ""), "objects.", "empty name", "give it a name"},
         BadScene{"{\"format\": 1, \"materials\": {\"a\": {\"roughness\": 1.5}}}", "materials.a.roughness: ", "1.5",
                  "[0, 1]"},

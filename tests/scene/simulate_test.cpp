@@ -318,6 +318,57 @@ TEST(Simulate, APartThatHasComeToRestIsGroundAgainAndCanBeCutAgain) {
     }
 }
 
+TEST(Simulate, AnEditThatEnclosesABodyNeitherShootsItNorStopsTheOthers) {
+    const World world = parsed(kDug);
+    const std::vector<TimedCommand> enclose = {
+        {1.0, "edits",
+         R"({"time": 1, "command": {"add": {"id": "tomb", "shape": "sphere", "radius": 2, "position": [0, 0.5, 0]}}})",
+         1}};
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 4, .backend = engine, .edits = enclose});
+        for (const json& f : out["frames"])
+            for (const char* key : {"position", "linear_velocity", "angular_velocity"})
+                for (const json& v : body(f, "b")[key]) {
+                    ASSERT_TRUE(v.is_number()) << engine << " " << key;
+                    EXPECT_LT(std::abs(v.get<double>()), 10) << engine << " " << key << " " << f["time"];
+                }
+        EXPECT_NEAR(body(out["frames"].back(), "o")["position"][1].get<double>(), 0.5, 0.01) << engine;
+        EXPECT_TRUE(body(out["frames"].back(), "o")["asleep"].get<bool>()) << engine;
+    }
+}
+
+TEST(Simulate, ATriggerIsLeftByAPartThatIsABodyNoMore) {
+    json scene = json::parse(kPillar);
+    scene["objects"] = json::parse(R"({"gate": {"shape": "box", "half_extents": [0.5, 0.5, 0.5]}})");
+    scene["triggers"] = json::parse(R"([{"id": "stump", "object": "gate", "position": [0, 1.6, 0]}])");
+    const World world = parsed(scene.dump());
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 7, .every = 7, .backend = engine, .edits = kCut});
+        std::vector<std::string> told;
+        double left = 0;
+        for (const json& e : out["events"]) {
+            if (e["a"] != "stump") continue;
+            EXPECT_EQ(e["b"], "part1") << engine;
+            told.push_back(e["type"]);
+            left = e["time"].get<double>();
+        }
+        EXPECT_THAT(told, testing::ElementsAre("enter", "leave")) << engine;
+        EXPECT_GT(left, 2.5) << engine << ": when it settled";
+    }
+}
+
+// One more than there may be.
+TEST(SlowSimulate, AMillionBodiesAreRefusedAtOnce) {
+    std::string edits, bodies;
+    for (int i = 0; i < 65537; ++i) {
+        const std::string n = std::to_string(i), comma = i > 0 ? "," : "";
+        edits += comma + R"({"id": "e)" + n + R"(", "shape": "sphere"})";
+        bodies += comma + R"({"id": "b)" + n + R"(", "edits": ["e)" + n + "\"]}";
+    }
+    EXPECT_THAT(message(R"({"format": 1, "edits": [)" + edits + "],\n\"bodies\": [" + bodies + "]}"),
+                testing::AllOf(HasSubstr("s.kiln.json:2:"), HasSubstr("65537"), HasSubstr("65535")));
+}
+
 TEST(Simulate, TimesAreTidy) {
     const auto text = parsed(kDug).simulate_json({.seconds = 0.05});
     ASSERT_TRUE(text);

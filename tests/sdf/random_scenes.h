@@ -80,7 +80,7 @@ inline Scene random_scene(uint32_t seed, int edits) {
             Node node = r.leaf();
             if (fold) {
                 node.kind = Node::Kind::Fold;
-                node.op = Op(r.below(3));
+                node.op = Op(r.below(4));
                 node.blend_radius = r.below(2) == 0 ? 0.0f : r.in(0.01f, 0.3f);
                 node.domain.clear();
                 for (int c = r.below(4) + 1; c > 0; --c) {
