@@ -92,8 +92,8 @@ CascadesBlock cascades_block(const ShadowCascades& c, vec3 eye, uint32_t light) 
         const ShadowCascades::Square& s = c.squares[k];
         b.squares[k] = {float((dotted(wide(eye), c.u) - s.u) / s.half), float((dotted(wide(eye), c.v) - s.v) / s.half),
                         float(1 / s.half), float(c.texel(k))};
-        b.casters[k] = {float((s.u - c.middle_u) / c.half), float((s.v - c.middle_v) / c.half),
-                        float(s.half / c.half), 0};
+        b.casters[k] = {float((s.u - c.middle_u) / c.half), float((s.v - c.middle_v) / c.half), float(s.half / c.half),
+                        0};
     }
     return b;
 }

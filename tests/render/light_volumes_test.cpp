@@ -66,13 +66,16 @@ TEST_F(LightVolumesGpu, LightsRoundTheEyeAndWithoutARangeReachAllThatTheyReach) 
     for (Light& l : frame.lights) l.range = 0;
     frame.lights.push_back({.kind = Light::Kind::Point, .position = frame.camera.position, .intensity = 1, .range = 6});
     const vec3 ahead = frame.camera.target - frame.camera.position;
-    frame.lights.push_back({.kind = Light::Kind::Spot, .direction = ahead, .position = frame.camera.position,
-                            .intensity = 1, .range = 6});
+    frame.lights.push_back(
+        {.kind = Light::Kind::Spot, .direction = ahead, .position = frame.camera.position, .intensity = 1, .range = 6});
     // Behind the eye, its cone reaching past it; and one that shines towards it.
-    frame.lights.push_back({.kind = Light::Kind::Spot, .direction = ahead,
-                            .position = frame.camera.position - ahead * 0.3f, .intensity = 1, .range = 9});
-    frame.lights.push_back({.kind = Light::Kind::Spot, .direction = ahead * -1.0f, .position = {0, 1.5f, 0},
-                            .intensity = 1, .range = 3});
+    frame.lights.push_back({.kind = Light::Kind::Spot,
+                            .direction = ahead,
+                            .position = frame.camera.position - ahead * 0.3f,
+                            .intensity = 1,
+                            .range = 9});
+    frame.lights.push_back(
+        {.kind = Light::Kind::Spot, .direction = ahead * -1.0f, .position = {0, 1.5f, 0}, .intensity = 1, .range = 3});
     expect_equal(frame, 6);
 }
 

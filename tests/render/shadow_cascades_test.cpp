@@ -5,8 +5,10 @@
 #include "image/metrics.h"
 #include "render/lib/pack.h"
 #include "render/passes/cascades.h"
+#include "render/passes/lamps.h"
 #include "render/shadow_cascades.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -32,7 +34,8 @@ TEST(ShadowCascades, HoldAllThatCastsAndAllThatTheCameraSeesUpToTheirReach) {
         std::vector<Box3> casters;
         const float wide = std::exp2(draw.in(-2, 9));
         for (int i = 0; i < 5; ++i) {
-            const vec3 at = draw.way() * (wide * draw.in(0, 1)), half = vec3{1, 1, 1} * (0.1f * wide * draw.in(0.1f, 1));
+            const vec3 at = draw.way() * (wide * draw.in(0, 1)),
+                       half = vec3{1, 1, 1} * (0.1f * wide * draw.in(0.1f, 1));
             casters.push_back({at - half, at + half});
         }
         Camera camera;
@@ -112,8 +115,8 @@ struct ShadowMapsGpu : GpuTest {
         for (const MeshCaster& caster : meshes.casters()) boxes.push_back(caster.bounds);
         fitted = fit_cascades(boxes, frame.lights[0].direction, frame.camera, 1.5, side);
         const MeshHandles handles = meshes.import(g);
-        const CascadeHandles drawn = draw_cascades(g, handles, fitted, caster_lists(meshes.casters(), fitted),
-                                                   frame.camera.position, 0);
+        const CascadeHandles drawn =
+            draw_cascades(g, handles, fitted, caster_lists(meshes.casters(), fitted), frame.camera.position, 0);
         std::vector<Readback> reads;
         for (uint32_t k = 0; k < fitted.squares.size(); ++k) reads.push_back(g.readback(drawn.maps, 0, k));
         rhi::must(runner_->execute(g));
@@ -129,8 +132,8 @@ Frame hills() {
     const model::Surface grey = meshes::matte({0.6f, 0.6f, 0.6f});
     Draw draw;
     for (int i = 0; i < 40; ++i)
-        frame.meshes.push_back(
-            meshes::at(meshes::sphere(draw.in(0.1f, 1.2f), 16, grey), {draw.in(-20, 20), draw.in(0, 2), draw.in(-20, 20)}));
+        frame.meshes.push_back(meshes::at(meshes::sphere(draw.in(0.1f, 1.2f), 16, grey),
+                                          {draw.in(-20, 20), draw.in(0, 2), draw.in(-20, 20)}));
     frame.meshes.push_back(meshes::at(meshes::sheet(-24, -24, 24, 24, grey), {0, -0.5f, 0}));
     frame.camera.position = {0.4f, 1.5f, 3.2f};
     frame.camera.target = {0.4f, 1.1f, 1.2f};
@@ -183,8 +186,8 @@ struct ShadowCascadesGpu : testing::Test {
         if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
     }
     Picture picture(const Frame& frame, MeshShadows shadows, int side = 512) {
-        return rhi::must(renderer->render(
-            frame, {.width = 96, .height = 72, .mesh_shadows = shadows, .shadow_map_side = side}));
+        return rhi::must(
+            renderer->render(frame, {.width = 96, .height = 72, .mesh_shadows = shadows, .shadow_map_side = side}));
     }
     // Of the radiance, over the mean of the first.
     static double apart(const Picture& a, const Picture& b) {
@@ -243,7 +246,8 @@ TEST_F(ShadowCascadesGpu, LeaveNoGapBetweenMapsAndNoStripesOnAPlane) {
     frame.camera.target = {0, 0.3f, 0};
     frame.meshes = {meshes::at(meshes::sheet(-30, -30, 30, 30, grey), {0, 0, 0})};
     for (const float height : {0.05f, 0.2f, 1.0f, 5.0f}) {
-        frame.lights = {{.kind = Light::Kind::Directional, .direction = {0.8f, -height, 0.6f}, .angular_diameter_deg = 2}};
+        frame.lights = {
+            {.kind = Light::Kind::Directional, .direction = {0.8f, -height, 0.6f}, .angular_diameter_deg = 2}};
         const Picture rays = picture(frame, MeshShadows::Rays, 256), maps = picture(frame, MeshShadows::Cascades, 256);
         EXPECT_GE(renderer->stats().cascades, 3);
         EXPECT_LE(apart(rays, maps), 1e-4) << height;
@@ -261,7 +265,7 @@ TEST_F(ShadowCascadesGpu, LeaveNoGapBetweenMapsAndNoStripesOnAPlane) {
     EXPECT_LE(apart(rays, maps), 0.02);
 }
 
-TEST_F(ShadowCascadesGpu, CastHolesAndLeaveOtherLightsToRays) {
+TEST_F(ShadowCascadesGpu, CastHolesAndLampsHaveMapsToo) {
     Frame frame = yard(1);
     model::Image checks{.name = "checks", .width = 4, .height = 4, .rgba = {}};
     for (int i = 0; i < 16; ++i)
@@ -279,10 +283,50 @@ TEST_F(ShadowCascadesGpu, CastHolesAndLeaveOtherLightsToRays) {
     Frame bare = frame;
     for (MeshInstance& m : bare.meshes) m.transform.position.y += 50;
     EXPECT_GT(apart(rays, picture(bare, MeshShadows::Cascades)), 0.06);
-    // Without a sun nobody asks for maps.
-    frame.lights.erase(frame.lights.begin() + 1);
+    // Without meshes nobody asks for maps.
+    frame.meshes.clear();
     EXPECT_EQ(picture(frame, MeshShadows::Rays).rgba, picture(frame, MeshShadows::Cascades).rgba);
     EXPECT_EQ(renderer->stats().mesh_shadows, "rays");
+}
+
+// Six faces round a lamp, one before a spot; each alone, over the borders of faces too.
+TEST_F(ShadowCascadesGpu, OfLampsDrawThePictureThatRaysDraw) {
+    Frame frame = yard(1);
+    const vec3 middle{0.2f, 0.3f, 0.3f};  // between the things
+    const Light lamps[] = {
+        {.kind = Light::Kind::Point, .position = middle, .intensity = 2},
+        {.kind = Light::Kind::Point, .position = middle, .intensity = 2, .radius = 0.05f},
+        {.kind = Light::Kind::Point, .position = {1.1f, 0.9f, 0.8f}, .intensity = 3, .range = 4, .radius = 0.1f},
+        {.kind = Light::Kind::Spot, .direction = {0.4f, -1, -0.2f}, .position = {-0.6f, 1.4f, 0.6f}, .intensity = 9},
+        {.kind = Light::Kind::Spot,
+         .direction = {-0.4f, -1, -0.2f},
+         .position = {0.6f, 1.4f, 0.6f},
+         .intensity = 9,
+         .radius = 0.1f,
+         .inner_deg = 40,
+         .outer_deg = 75}};
+    for (const Light& lamp : lamps) {
+        frame.lights = {lamp};
+        const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
+        EXPECT_EQ(renderer->stats().mesh_shadows, "cascades");
+        const double off = apart(rays, maps);
+        RecordProperty("off", std::to_string(off));
+        EXPECT_LE(off, 0.02) << &lamp - lamps;
+    }
+}
+
+// More lamps than there are faces for: the others have rays.
+TEST_F(ShadowCascadesGpu, LampsWithoutAMapHaveRays) {
+    Frame frame = yard(1);
+    frame.lights.clear();
+    for (int i = 0; i < 12; ++i)
+        frame.lights.push_back(
+            {.kind = Light::Kind::Point, .position = {0.2f * float(i) - 1, 1.2f, 0.5f}, .intensity = 0.4f});
+    const LampFaces faces = lamp_faces(frame.lights, frame.camera.position, kMostFaces);
+    EXPECT_EQ(faces.faces.size(), size_t(kMostFaces));
+    EXPECT_EQ(std::count(faces.of.begin(), faces.of.end(), 0.0f), 4);
+    const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
+    EXPECT_LE(apart(rays, maps), 0.02);
 }
 
 TEST_F(ShadowCascadesGpu, ASideThatIsNoPowerOfTwoIsRefused) {

@@ -65,8 +65,8 @@ struct UpscaleGpu : testing::Test {
                     double sum = 0;
                     for (int j = 0; j < kSide; ++j)
                         for (int i = 0; i < kSide; ++i)
-                            sum += double(
-                                large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
+                            sum +=
+                                double(large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
                     out.values.push_back(shown(float(sum / (kSide * kSide))));
                 }
             }
@@ -81,8 +81,7 @@ struct UpscaleGpu : testing::Test {
         for (int y = 0; y < kHeight; ++y)
             for (int x = 0; x < kWidth; ++x)
                 for (size_t k = 0; k < 3; ++k)
-                    out.values.push_back(
-                        float(small.srgb[size_t((y / by * (kWidth / by) + x / by) * 4) + k]) / 255);
+                    out.values.push_back(float(small.srgb[size_t((y / by * (kWidth / by) + x / by) * 4) + k]) / 255);
         return out;
     }
     std::unique_ptr<Renderer> renderer;

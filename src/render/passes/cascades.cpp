@@ -22,10 +22,8 @@ constexpr uint32_t kGroupsInRow = 32768;  // fewer than a device takes along an 
 const Kernel kCascadeCull{"cascade cull", kCascadeCullSpv};
 const Kernel kShadowCascades{"shadow cascades", kShadowCascadesSpv};
 const RasterKernel kCascade{.name = "cascades", .vertex = kCascadeVertSpv, .fragment = {}, .depth = kHeights};
-const RasterKernel kCascadeMask{.name = "cascades with holes",
-                                .vertex = kCascadeVertSpv,
-                                .fragment = kCascadeMaskFragSpv,
-                                .depth = kHeights};
+const RasterKernel kCascadeMask{
+    .name = "cascades with holes", .vertex = kCascadeVertSpv, .fragment = kCascadeMaskFragSpv, .depth = kHeights};
 
 CascadeHandles draw_cascades(Graph& g, const MeshHandles& m, const ShadowCascades& cascades, const CasterLists& casters,
                              vec3 eye, uint32_t light) {
@@ -33,25 +31,22 @@ CascadeHandles draw_cascades(Graph& g, const MeshHandles& m, const ShadowCascade
     const CascadesBlock block = cascades_block(cascades, eye, light);
     out.block = g.block(block);
     const auto side = uint32_t(cascades.side), count = block.count, clusters = uint32_t(casters.clusters.size());
-    out.maps = g.create("cascades", {.size = {side, side, count},
-                                     .format = rhi::Format::Depth32Float,
-                                     .dimension = rhi::Dimension::D2Array});
+    out.maps = g.create(
+        "cascades",
+        {.size = {side, side, count}, .format = rhi::Format::Depth32Float, .dimension = rhi::Dimension::D2Array});
     const Buffer parts = g.upload("cascade parts", std::span<const CascadePart>(casters.parts));
     const Buffer all = g.upload("casters", std::span<const MeshClusterRef>(casters.clusters));
     Buffer drawn = g.create_buffer("casters drawn", uint64_t{count} * clusters * sizeof(MeshClusterRef));
     Buffer draws = g.create_buffer("draws of casters", uint64_t{2 * kMostCascades * kDrawWords} * sizeof(uint32_t));
     g.clear(drawn);
     g.clear(draws);
-    g.dispatch(kCascadeCull,
-               Groups{std::min(clusters, kGroupsInRow), (clusters + kGroupsInRow - 1) / kGroupsInRow, 1},
+    g.dispatch(kCascadeCull, Groups{std::min(clusters, kGroupsInRow), (clusters + kGroupsInRow - 1) / kGroupsInRow, 1},
                {g.uniform(out.block), g.read(all), g.read(m.parts), g.read(m.corners), g.read(m.vertices),
                 g.read(parts), g.read_write(drawn), g.read_write(draws)},
                CascadeCullPush{.clusters = clusters, .solid = casters.solid, .pad_0 = 0, .pad_1 = 0});
     for (uint32_t k = 0; k < count; ++k) {
-        CascadeDrawPush push{.first = k * clusters,
-                             .u = block.casters[k].x,
-                             .v = block.casters[k].y,
-                             .per_map = 1 / block.casters[k].z};
+        CascadeDrawPush push{
+            .first = k * clusters, .u = block.casters[k].x, .v = block.casters[k].y, .per_map = 1 / block.casters[k].z};
         const auto call = [&](bool holes) {
             return DrawCall{.indirect_buffer = draws,
                             .indirect_offset = uint64_t{(2 * k + (holes ? 1 : 0)) * kDrawWords} * sizeof(uint32_t)};

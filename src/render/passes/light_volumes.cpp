@@ -41,12 +41,14 @@ const Kernel& light_over_kernel(const TileInputs& in) {
     return in.image_sky ? kLightOverImage : kLightOver;
 }
 
-const RasterKernel& light_volume_kernel(const TileInputs& in) { return in.has_glass ? kLightVolumeGlass : kLightVolume; }
+const RasterKernel& light_volume_kernel(const TileInputs& in) {
+    return in.has_glass ? kLightVolumeGlass : kLightVolume;
+}
 
 void add_volumes(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
                  const Image& fractions, const Buffer& masks, std::span<const Image> tints, const ShadowPush& push,
                  Image& sum) {
-    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),       g.read(in.lights),  g.read(in.ggx_table),
+    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),       g.read(in.lights), g.read(in.ggx_table),
                           g.read(visibility),  g.read(surface.words), g.read(fractions), g.read(masks)};
     for (const Image& tint : tints) uses.push_back(g.read(tint));
     uses.push_back(g.read(in.volumes));
