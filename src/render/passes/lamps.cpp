@@ -22,10 +22,8 @@ constexpr uint32_t kGroupsInRow = 32768;  // fewer than a device takes along an 
 const Kernel kLampCull{"lamp cull", kLampCullSpv};
 const Kernel kShadowLamps{"shadow lamps", kShadowLampsSpv};
 const RasterKernel kLampMap{.name = "lamp maps", .vertex = kLampMapVertSpv, .fragment = {}, .depth = kNearness};
-const RasterKernel kLampMapMask{.name = "lamp maps with holes",
-                                .vertex = kLampMapVertSpv,
-                                .fragment = kCascadeMaskFragSpv,
-                                .depth = kNearness};
+const RasterKernel kLampMapMask{
+    .name = "lamp maps with holes", .vertex = kLampMapVertSpv, .fragment = kCascadeMaskFragSpv, .depth = kNearness};
 
 LampHandles draw_lamps(Graph& g, const MeshHandles& m, std::span<const LampFace> faces, const CasterLists& casters,
                        int side) {

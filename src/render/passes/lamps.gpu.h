@@ -11,12 +11,13 @@ namespace kiln::render {
 using uint = uint32_t;
 #endif
 
-KILN_CONST uint kMostFaces = 48u;      // of all lights together
-KILN_CONST float kLampNear = 2e-3f;    // metres: what is nearer to the light casts nothing
+KILN_CONST uint kMostFaces = 48u;    // of all lights together
+KILN_CONST float kLampNear = 2e-3f;  // metres: what is nearer to the light casts nothing
 
 struct LampFace {
-    vec4 u, v, w;  // unit axes: across the map, and ahead; u.w: half of the map on the plane; v.w: the light's range, metres, 0: none
-    vec4 at;       // the light, metres from the eye
+    vec4 u, v,
+        w;  // unit axes: across the map, and ahead; u.w: half of the map on the plane; v.w: the light's range, metres, 0: none
+    vec4 at;  // the light, metres from the eye
 };
 
 struct LampCullPush {
