@@ -6,6 +6,7 @@
 #include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
+#include "render/passes/lamps.h"
 #include "render/passes/light_volumes.h"
 #include "render/passes/upscale.h"
 
@@ -254,7 +255,8 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     out.push_back(&kCluster);
     out.push_back(&shadow_kernel(in));
     if (in.has_cascades) out.insert(out.end(), {&kCascadeCull, &kShadowCascades});
-    if (in.has_meshes && !in.cascades_alone) out.push_back(&mesh_shadow_kernel(in));
+    if (in.has_lamps) out.insert(out.end(), {&kLampCull, &kShadowLamps});
+    if (in.has_meshes && !in.maps_alone) out.push_back(&mesh_shadow_kernel(in));
     if (in.volume_count > 0) out.push_back(&light_over_kernel(in));
     if (in.volume_count == 0 || in.has_glass || in.has_blends) out.push_back(&light_kernel(in));
     through_kernels(in, out);
@@ -286,6 +288,8 @@ std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
     if (in.volume_count > 0) out.push_back(&light_volume_kernel(in));
     if (in.has_cascades) out.push_back(&kCascade);
     if (in.has_cascades && in.mesh_holes) out.push_back(&kCascadeMask);
+    if (in.has_lamps) out.push_back(&kLampMap);
+    if (in.has_lamps && in.mesh_holes) out.push_back(&kLampMapMask);
     return out;
 }
 

@@ -20,6 +20,7 @@
 #include "render/passes/forward.h"
 #include "render/particle_bins.h"
 #include "render/passes/instances.h"
+#include "render/passes/lamps.h"
 #include "render/passes/refine.gpu.h"
 #include "render/picture.h"
 #include "render/through_rects.h"
@@ -145,7 +146,7 @@ struct Renderer::Impl {
         in.moved.owners.use = refines_on_host() ? tape_use(moved.code.code) : any_kind(tape_use(moved.code.code));
         in.moved.has_boxes = !moved.boxes.empty();
         in.mesh_holes = meshes->holes();
-        choose_cascades(frame, settings, in);
+        choose_maps(frame, settings, in);
         in.transparent_layers = settings.view == View::Shaded ? std::clamp(settings.transparent_layers, 0, 16) : 0;
         in.has_glass = in.transparent_layers > 0 &&
                        std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) {
@@ -164,15 +165,29 @@ struct Renderer::Impl {
         return settings.cull_meshes && settings.accelerate && meshes->clusters_in_sight() > 0;
     }
     static bool is_somewhere(const Light& light) { return light.kind != Light::Kind::Directional; }
-    // Maps are for the first sun.
-    void choose_cascades(const Frame& frame, const RenderSettings& settings, TileInputs& in) const {
-        const auto is_sun = [](const Light& l) { return l.kind == Light::Kind::Directional; };
+    // Maps are for the first sun, and for the first lamps and spots.
+    void choose_maps(const Frame& frame, const RenderSettings& settings, TileInputs& in) const {
+        if (!in.has_meshes || settings.mesh_shadows != MeshShadows::Cascades || settings.view != View::Shaded) return;
+        const auto is_sun = [](const Light& l) { return !is_somewhere(l); };
         const auto sun = std::find_if(frame.lights.begin(), frame.lights.end(), is_sun);
-        in.has_cascades = in.has_meshes && settings.mesh_shadows == MeshShadows::Cascades &&
-                          settings.view == View::Shaded && sun != frame.lights.end();
+        in.has_cascades = sun != frame.lights.end();
         in.mapped_light = uint32_t(sun - frame.lights.begin());
-        in.cascades_alone = in.has_cascades && frame.lights.size() == 1;
+        const LampFaces faces = faces_of_lamps(frame);
+        in.has_lamps = !faces.faces.empty();
+        size_t mapped = in.has_cascades ? 1 : 0;
+        for (const float of : faces.of) mapped += of != 0;
+        in.maps_alone = mapped == frame.lights.size();
     }
+    // As many as a buffer has room for with a list of all casters each.
+    LampFaces faces_of_lamps(const Frame& frame) const {
+        uint64_t clusters = 1;
+        for (const MeshCaster& caster : meshes->casters())
+            clusters += (caster.triangles + kMeshCluster - 1) / kMeshCluster;
+        const uint64_t most = rhi::kMaxStorageBinding / (clusters * sizeof(MeshClusterRef));
+        return lamp_faces(frame.lights, frame.camera.position, uint32_t(std::min<uint64_t>(most, kMostFaces)));
+    }
+    void draw_maps(Graph& g, const Frame& frame, const RenderSettings& settings, const FrameParams& params,
+                   TileInputs& in);
     // Levels and instances are marched by the compute shader whatever the tier: see docs/architecture.md.
     static bool traces(const Frame& frame, const RenderSettings& settings) {
         return settings.tier == Tier::Rt && !settings.analytic && frame.field && frame.instances.empty();
@@ -279,6 +294,31 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
     in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
 }
 
+void Renderer::Impl::draw_maps(Graph& g, const Frame& frame, const RenderSettings& settings, const FrameParams& params,
+                               TileInputs& in) {
+    const int side =
+        settings.shadow_map_side > 0 ? settings.shadow_map_side : shadow_map_side(params.width, params.height);
+    stats.mesh_shadows = "cascades";
+    CasterLists casters;
+    if (in.has_cascades) {
+        std::vector<Box3> bounds;
+        for (const MeshCaster& caster : meshes->casters()) bounds.push_back(caster.bounds);
+        const ShadowCascades fitted = fit_cascades(bounds, frame.lights[in.mapped_light].direction, frame.camera,
+                                                   double(settings.width) / settings.height, side);
+        casters = caster_lists(meshes->casters(), fitted);
+        in.cascades = draw_cascades(g, in.meshes, fitted, casters, frame.camera.position, in.mapped_light);
+        stats.cascades = int(fitted.squares.size());
+    } else {
+        casters =
+            caster_lists(meshes->casters(), {.half = 1, .range = 1});  // where they are in light space is not asked
+    }
+    if (!in.has_lamps) return;
+    const LampFaces faces = faces_of_lamps(frame);
+    // At most 64 MiB, and no finer than the sun's: a face is a fourth of what is around.
+    const int most = faces.faces.size() <= 16 ? 1024 : 512;
+    in.lamps = draw_lamps(g, in.meshes, faces.faces, casters, std::clamp(side / 2, 64, most));
+}
+
 void Renderer::Impl::shade_particles(Graph& g, const Frame& frame, const FrameParams& params, const ParticleBins& bins,
                                      ParticleHandles& out) {
     const auto is_sun = [](const Light& l) { return !is_somewhere(l); };
@@ -308,6 +348,12 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         for (const Light& light : frame.lights) {
             lights.push_back(shade::light_record(light));
             if (!settings.soft_shadows) lights.back().position.w = 0;
+        }
+        if (in.has_cascades) lights[in.mapped_light].color.w = 1;
+        if (in.has_lamps) {
+            const LampFaces faces = faces_of_lamps(frame);
+            for (size_t i = 0; i < lights.size(); ++i)
+                if (faces.of[i] != 0) lights[i].color.w = faces.of[i];
         }
         in.light_count = uint32_t(lights.size());
         LightRects rects = settings.cull_lights ? light_rects(frame.lights, params.camera, params.tile_x, params.tile_y,
@@ -371,18 +417,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                 in.moved.boxes = g.upload("changed boxes", std::span<const ChangedBox>(moved.boxes));
         }
         in.meshes = meshes->import(g);
-        if (in.has_cascades) {
-            const int side =
-                settings.shadow_map_side > 0 ? settings.shadow_map_side : shadow_map_side(params.width, params.height);
-            std::vector<Box3> boxes_of_casters;
-            for (const MeshCaster& caster : meshes->casters()) boxes_of_casters.push_back(caster.bounds);
-            const ShadowCascades fitted = fit_cascades(boxes_of_casters, frame.lights[in.mapped_light].direction,
-                                                       frame.camera, double(params.width) / params.height, side);
-            in.cascades = draw_cascades(g, in.meshes, fitted, caster_lists(meshes->casters(), fitted),
-                                        frame.camera.position, in.mapped_light);
-            stats.mesh_shadows = "cascades";
-            stats.cascades = int(fitted.squares.size());
-        }
+        if (in.has_cascades || in.has_lamps) draw_maps(g, frame, settings, params, in);
         if (in.rt) in.boxes = boxes->import(g);
         find_through(g, frame, params, in);
         if (in.has_particles) {

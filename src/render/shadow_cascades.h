@@ -17,7 +17,7 @@ namespace kiln::render {
 
 // Light space: u and v across the rays, w against them, world metres from the world's origin.
 struct ShadowCascades {
-    dvec3 u, v, w;
+    dvec3 u{}, v{}, w{};
     double half = 0;                    // of the widest square; those of the others are a power of two less
     double middle_u = 0, middle_v = 0;  // of the widest
     double low = 0, range = 0;          // along w: where casters begin, and how far up they are
@@ -26,7 +26,7 @@ struct ShadowCascades {
         double u = 0, v = 0;  // its middle: whole texels from the widest's
         double half = 0;
     };
-    std::vector<Square> squares;  // the smallest first; at most kMostCascades
+    std::vector<Square> squares = {};  // the smallest first; at most kMostCascades
 
     double texel(size_t square) const { return 2 * squares[square].half / side; }
 };

@@ -481,6 +481,33 @@ TEST_F(CliGpu, SimulateDrawsAPictureAFrame) {
     EXPECT_TRUE(fs::is_empty(folder_ / "p"));
 }
 
+// Techniques that may be chosen: each tells what it was, and a word that is none what it could be.
+TEST_F(CliGpu, ShadowsLightingAndScaleAreChosenOrRefusedInOneLine) {
+    write("ball.kiln.json", kBall);
+    write("t.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+    write("lit.kiln.json",
+          "{\"format\": 1, \"meshes\": [{\"id\": \"t\", \"file\": \"t.obj\"}], \"edits\": [{\"shape\": \"sphere\"}], "
+          "\"lights\": [{\"type\": \"directional\"}, {\"type\": \"point\", \"position\": [0, 3, 0]}]}");
+    const Outcome o = run(
+        "render lit.kiln.json -o a.png --size 32x24 --shadows cascades --lighting volumes --taa --scale 0.5 --json");
+    ASSERT_EQ(o.code, 0) << o.err;
+    for (const char* said :
+         {"\"mesh_shadows\": \"cascades\"", "\"lighting\": \"volumes\"", "\"rays\": [16, 12]", "\"size\": [32, 24]"})
+        EXPECT_THAT(o.out, HasSubstr(said));
+    const std::pair<const char*, const char*> wrong[] = {
+        {"--shadows cascade", "--shadows cascade: there are no such shadows; did you mean cascades?"},
+        {"--lighting volume", "--lighting volume: there is no such lighting; did you mean volumes?"},
+        {"--taa --scale 0.1", "--scale wants a number from 0.25 to 1"},
+        {"--scale 0.5", "--scale works with --taa, or with --quality ultra; add one of them"},
+    };
+    for (const auto& [flags, sentence] : wrong) {
+        const Outcome refused = run(std::string("render ball.kiln.json -o b.png --size 32x24 ") + flags);
+        EXPECT_EQ(refused.code, 2) << flags;
+        EXPECT_THAT(refused.err, HasSubstr(sentence));
+        EXPECT_FALSE(fs::exists(folder_ / "b.png"));
+    }
+}
+
 TEST_F(CliGpu, SectionsNotDrawnAreToldOnce) {
     write("later.kiln.json",
           "{\"format\": 1, \"cloths\": [{\"id\": \"flag\", \"size\": [1, 1]}], \"edits\": [{\"shape\": \"sphere\"}]}");

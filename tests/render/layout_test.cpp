@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Gate G21: what C++ and the shaders share has the same offsets on both sides, as read back from the SPIR-V.
+#include "render/passes/cascades.h"
+#include "render/passes/forward.h"
 #include "render/passes/instances.h"
+#include "render/passes/lamps.h"
 #include "render/passes/passes.h"
+#include "render/passes/taa_up.gpu.h"
+#include "render/passes/upscale.h"
 #include "rhi/spirv_reflect.h"
 
 #include <gtest/gtest.h>
@@ -125,6 +130,22 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     expect_array(kCluster, 2, light, sizeof(LightRecord));
 }
 
+TEST(Layout, CascadesAreTheSame) {
+    std::vector<uint32_t> expected{AT(CascadesBlock, u), AT(CascadesBlock, v), AT(CascadesBlock, w)};
+    for (const uint32_t first : {AT(CascadesBlock, squares), AT(CascadesBlock, casters)}) expected.push_back(first);
+    for (const uint32_t at :
+         {AT(CascadesBlock, range), AT(CascadesBlock, light), AT(CascadesBlock, count), AT(CascadesBlock, side)})
+        expected.push_back(at);
+    for (const auto& [kernel, number] : {std::pair{&kCascadeCull, 0u}, std::pair{&kShadowCascades, 1u}}) {
+        const rhi::Reflection r = reflected(*kernel);
+        const rhi::ReflectedBinding* b = binding(r, number);
+        ASSERT_TRUE(b) << kernel->name;
+        ASSERT_EQ(b->members.size(), 1u) << kernel->name;
+        EXPECT_EQ(offsets(b->members[0].members), expected) << kernel->name;
+    }
+    expect_array(kCascadeCull, 5, {AT(CascadePart, u), AT(CascadePart, v), AT(CascadePart, w)}, sizeof(CascadePart));
+}
+
 TEST(Layout, PushDataIsTheSame) {
     for (const Kernel* kernel : {&kBakeHalf, &kBakeSnorm8, &kBakeCopyHalf, &kBakeCopySnorm8}) {
         const rhi::Reflection r = reflected(*kernel);
@@ -136,7 +157,12 @@ TEST(Layout, PushDataIsTheSame) {
     }
     for (const Kernel* kernel : {&kMarchInstances, &kMarchLevelsInstances, &kShadowInstances})
         EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(InstancePush)) << kernel->name;
-    for (const Kernel* kernel : {&kShadow, &kShadowExact, &kLight}) {
+    EXPECT_EQ(reflected(kCascadeCull).push_bytes, sizeof(CascadeCullPush));
+    EXPECT_EQ(reflected(kLampCull).push_bytes, sizeof(LampCullPush));
+    EXPECT_EQ(reflected(kTaaUp).push_bytes, sizeof(TaaUpPush));
+    for (const Kernel* kernel : {&kUpDepth, &kUpOwners})
+        EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(UpPush)) << kernel->name;
+    for (const Kernel* kernel : {&kShadow, &kShadowExact, &kLight, &kShadowCascades}) {
         EXPECT_EQ(reflected(*kernel).push_bytes, sizeof(ShadowPush)) << kernel->name;
     }
 }
@@ -155,6 +181,16 @@ TEST(Layout, EveryKernelFitsTheFloor) {
                                  &kShadowExact,
                                  &kShadowLevelsExact,
                                  &kCluster,
+                                 &kCascadeCull,
+                                 &kShadowCascades,
+                                 &kLampCull,
+                                 &kShadowLamps,
+                                 &kTaaUp,
+                                 &kUpDepth,
+                                 &kUpOwners,
+                                 &kParticlesLight,
+                                 &kThroughMirror,
+                                 &kThroughMirrored,
                                  &kMotion,
                                  &kTaa,
                                  &kOutlineMask,

@@ -5,8 +5,10 @@
 #include "image/metrics.h"
 #include "render/lib/pack.h"
 #include "render/passes/cascades.h"
+#include "render/passes/lamps.h"
 #include "render/shadow_cascades.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -263,7 +265,7 @@ TEST_F(ShadowCascadesGpu, LeaveNoGapBetweenMapsAndNoStripesOnAPlane) {
     EXPECT_LE(apart(rays, maps), 0.02);
 }
 
-TEST_F(ShadowCascadesGpu, CastHolesAndLeaveOtherLightsToRays) {
+TEST_F(ShadowCascadesGpu, CastHolesAndLampsHaveMapsToo) {
     Frame frame = yard(1);
     model::Image checks{.name = "checks", .width = 4, .height = 4, .rgba = {}};
     for (int i = 0; i < 16; ++i)
@@ -281,10 +283,50 @@ TEST_F(ShadowCascadesGpu, CastHolesAndLeaveOtherLightsToRays) {
     Frame bare = frame;
     for (MeshInstance& m : bare.meshes) m.transform.position.y += 50;
     EXPECT_GT(apart(rays, picture(bare, MeshShadows::Cascades)), 0.06);
-    // Without a sun nobody asks for maps.
-    frame.lights.erase(frame.lights.begin() + 1);
+    // Without meshes nobody asks for maps.
+    frame.meshes.clear();
     EXPECT_EQ(picture(frame, MeshShadows::Rays).rgba, picture(frame, MeshShadows::Cascades).rgba);
     EXPECT_EQ(renderer->stats().mesh_shadows, "rays");
+}
+
+// Six faces round a lamp, one before a spot; each alone, over the borders of faces too.
+TEST_F(ShadowCascadesGpu, OfLampsDrawThePictureThatRaysDraw) {
+    Frame frame = yard(1);
+    const vec3 middle{0.2f, 0.3f, 0.3f};  // between the things
+    const Light lamps[] = {
+        {.kind = Light::Kind::Point, .position = middle, .intensity = 2},
+        {.kind = Light::Kind::Point, .position = middle, .intensity = 2, .radius = 0.05f},
+        {.kind = Light::Kind::Point, .position = {1.1f, 0.9f, 0.8f}, .intensity = 3, .range = 4, .radius = 0.1f},
+        {.kind = Light::Kind::Spot, .direction = {0.4f, -1, -0.2f}, .position = {-0.6f, 1.4f, 0.6f}, .intensity = 9},
+        {.kind = Light::Kind::Spot,
+         .direction = {-0.4f, -1, -0.2f},
+         .position = {0.6f, 1.4f, 0.6f},
+         .intensity = 9,
+         .radius = 0.1f,
+         .inner_deg = 40,
+         .outer_deg = 75}};
+    for (const Light& lamp : lamps) {
+        frame.lights = {lamp};
+        const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
+        EXPECT_EQ(renderer->stats().mesh_shadows, "cascades");
+        const double off = apart(rays, maps);
+        RecordProperty("off", std::to_string(off));
+        EXPECT_LE(off, 0.02) << &lamp - lamps;
+    }
+}
+
+// More lamps than there are faces for: the others have rays.
+TEST_F(ShadowCascadesGpu, LampsWithoutAMapHaveRays) {
+    Frame frame = yard(1);
+    frame.lights.clear();
+    for (int i = 0; i < 12; ++i)
+        frame.lights.push_back(
+            {.kind = Light::Kind::Point, .position = {0.2f * float(i) - 1, 1.2f, 0.5f}, .intensity = 0.4f});
+    const LampFaces faces = lamp_faces(frame.lights, frame.camera.position, kMostFaces);
+    EXPECT_EQ(faces.faces.size(), size_t(kMostFaces));
+    EXPECT_EQ(std::count(faces.of.begin(), faces.of.end(), 0.0f), 4);
+    const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
+    EXPECT_LE(apart(rays, maps), 0.02);
 }
 
 TEST_F(ShadowCascadesGpu, ASideThatIsNoPowerOfTwoIsRefused) {

@@ -100,6 +100,48 @@ TEST_F(ThroughGpu, ClearGlassInAWhiteFurnaceVanishes) {
     }
 }
 
+// Nothing shines but a wall behind a slab: what the slab's top shows is the wall's light by Fresnel's share, and black where it is mirrored past it.
+TEST_F(ThroughGpu, GlassMirrorsWhatIsSolid) {
+    field::worlds::World world{"wall",
+                               {edit(Box{.half_extents = {0.8f, 0.8f, 0.1f}}, {0, 0.9f, -2})},
+                               {.voxel_size = 0.05f, .bounds = {{-1, 0, -2.2f}, {1, 1.8f, -1.8f}}}};
+    Frame frame = bright_frame();
+    frame.field = world.field();
+    frame.environment = Environment{.color = {0, 0, 0}};
+    frame.materials[0] = frame.materials[1] = {.base_color = {0, 0, 0}, .emissive = {2, 1, 0.5f}};
+    frame.materials[2] = {.base_color = {0, 0, 0}, .roughness = 0, .opacity = 1e-6f};
+    frame.instances = {glass_of(Box{{1.6f, 0.1f, 1.6f}}, {0, -0.1f, 0}, 2)};
+    frame.camera.position = {0, 1, 3.5f};
+    const Picture p = picture(frame, 96, 72);
+    const shade::CameraParams eye = shade::camera_params(frame.camera, p.width, p.height);
+    int wall = 0, past = 0;
+    for (int y = 0; y < p.height; ++y) {
+        for (int x = 0; x < p.width; ++x) {
+            const vec3 d = shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f);
+            if (d.y >= 0) continue;
+            const vec3 at = frame.camera.position + d * (frame.camera.position.y / -d.y);
+            if (std::fabs(at.x) > 1.4f || std::fabs(at.z) > 1.4f) continue;
+            // Where the mirrored ray meets the wall's front.
+            const float way = (-1.9f - at.z) / d.z;
+            const vec3 there{at.x + d.x * way, -d.y * way, -1.9f};
+            const float off = std::max(std::fabs(there.x) - 0.8f, std::fabs(there.y - 0.9f) - 0.8f);
+            const float* c = &p.rgba[size_t(y * p.width + x) * 4];
+            const float share = shade::dielectric_reflectance(-d.y, 1 / 1.5f);
+            if (off < -0.06f) {
+                EXPECT_NEAR(c[0], 2 * share, 0.06f) << x << ", " << y;
+                EXPECT_NEAR(c[2], 0.5f * share, 0.02f) << x << ", " << y;
+                ++wall;
+            }
+            if (off > 0.06f) {
+                EXPECT_LT(c[0], 0.005f) << x << ", " << y;
+                ++past;
+            }
+        }
+    }
+    EXPECT_GT(wall, 100);
+    EXPECT_GT(past, 20);
+}
+
 // A ray through a ball leaves where two refractions in the plane of ray and middle take it.
 TEST_F(ThroughGpu, ABallBendsRaysAsSnellSays) {
     Frame frame = bright_frame();

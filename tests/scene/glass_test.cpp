@@ -144,9 +144,9 @@ TEST(GlassGpu, LooksAsThePathTracerSays) {
     }
     const auto slow = render_reference(*frame, settings, 96);
     ASSERT_TRUE(slow) << slow.error().message;
-    // Left a ball, right a block with something in it and many ways back and forth, of which one is followed. What both reflect is the sky alone.
-    EXPECT_LT(image::flip(shown(*slow, false), shown(fast, false)), 0.04);
-    EXPECT_LT(image::flip(shown(*slow, true), shown(fast, true)), 0.06);
+    // Left a ball, right a block with something in it and many ways back and forth, of which one is followed and one is thrown back once.
+    EXPECT_LT(image::flip(shown(*slow, false), shown(fast, false)), 0.025);
+    EXPECT_LT(image::flip(shown(*slow, true), shown(fast, true)), 0.05);
     // Glass is there at all.
     Frame bare = *frame;
     std::erase_if(bare.instances, [](const Instance& i) { return i.glass != 0; });

@@ -22,7 +22,7 @@ struct LightRecord {
     vec4
         position;  // world metres; w: radius of its disc in metres; directional: tangent of the half angle the disc is seen under
     vec4 direction;  // unit, the way the light goes; w: 1 / range², 0 where no range ends it
-    vec4 color;      // lux or candela, times colour; w: unused, 0
+    vec4 color;      // lux or candela, times colour; w: not 0 where maps hold the shadows of meshes, see lamp_faces.h
     uint kind;
     float spot_scale, spot_offset;  // brightness of a spot: saturate(cosine * scale + offset)²
     float pad_0;

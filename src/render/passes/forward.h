@@ -9,7 +9,8 @@ namespace kiln::render {
 extern const RasterKernel kLines, kOutlineHull;
 extern const Kernel kLinesOver, kOutlineMeshes;
 extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend,
-    kThroughEnd, kThroughFront, kThroughMirror, kThroughMirrored, kThroughMirroredImage, kMeshTrace, kShadowGlass;
+    kThroughBendImage, kThroughEnd, kThroughFront, kThroughMirror, kThroughMirrored, kThroughMirroredImage, kMeshTrace,
+    kShadowGlass;
 extern const Kernel kParticles, kParticlesStart, kParticlesLight, kParticlesLightImage;
 
 // What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.

@@ -2,6 +2,7 @@
 #include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
+#include "render/passes/lamps.h"
 #include "render/passes/light_volumes.h"
 #include "render/passes/passes.h"
 
@@ -38,16 +39,14 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
     uint32_t first = 0;
     do {
         const uint32_t next = first + kLightsAtOnce;
-        const ShadowPush push{.first_light = first,
-                              .more = next < in.lights_of_tile ? 1u : 0u,
-                              .mapped = in.has_cascades ? in.mapped_light + 1 : 0,
-                              .pad_0 = 0};
+        const ShadowPush push{.first_light = first, .more = next < in.lights_of_tile ? 1u : 0u, .pad_0 = 0, .pad_1 = 0};
         Image fractions = shadow(g, in, visibility, surface, masks, push);
         shadow_instances(g, in, visibility, surface, masks, first, fractions);
         // In a tile's list a light comes no later than in the frame's.
         if (in.has_cascades && first <= in.mapped_light)
             fractions = shadow_by_cascades(g, in, surface, masks, fractions, push);
-        if (in.has_meshes && !in.cascades_alone) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
+        if (in.has_lamps) fractions = shadow_by_lamps(g, in, surface, masks, fractions, push);
+        if (in.has_meshes && !in.maps_alone) fractions = shadow_meshes(g, in, surface, masks, fractions, push);
         std::vector<Image> tints;
         if (in.has_glass) tints = shadow_glass(g, in, visibility, surface, masks, first, fractions);
         std::vector<Use> uses{g.uniform(in.frame),    g.read(in.rays),    g.read(in.lights),     g.read(in.ggx_table),

@@ -282,7 +282,7 @@ void main() {
     for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
         uint index = next_light(walk);
         if (index == kNoLight) break;
-        if ((tile_wants & (1u << channel)) == 0u || index + 1u == push.mapped) continue;
+        if ((tile_wants & (1u << channel)) == 0u || lights[index].color.w != 0.0) continue;  // maps have those
         begin_light(lights[index]);
         float before = visible_fraction(fractions, channel);
         bool open = lit && before > 0.0;

@@ -37,7 +37,7 @@ Image sun_on_particles(Graph& g, const TileInputs& tile, const ParticlePush& pus
     s.words = g.create("particles surface", {.size = p.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kParticlesStart, p.size, {g.read(in.lights), g.write(s.seen), g.write(s.words)}, push);
     const bool mapped = in.has_cascades && in.mapped_light == p.sun;
-    const ShadowPush first{.first_light = 0, .more = 0, .mapped = mapped ? p.sun + 1 : 0, .pad_0 = 0};
+    const ShadowPush first{.first_light = 0, .more = 0, .pad_0 = 0, .pad_1 = 0};
     Image fractions = shadow(g, in, s.seen, s, p.masks, first);
     shadow_instances(g, in, s.seen, s, p.masks, 0, fractions);
     if (mapped) fractions = shadow_by_cascades(g, in, s, p.masks, fractions, first);

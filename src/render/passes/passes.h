@@ -9,6 +9,7 @@
 #include "render/graph.h"
 #include "render/passes/bake.gpu.h"
 #include "render/passes/cascades.gpu.h"
+#include "render/passes/lamps.gpu.h"
 #include "render/passes/frame.gpu.h"
 #include "render/passes/lines.gpu.h"
 #include "render/passes/outline.gpu.h"
@@ -86,6 +87,12 @@ struct CascadeHandles {
     Block block;  // CascadesBlock
 };
 
+// Those of lamps and spots, see lamps.h.
+struct LampHandles {
+    Image maps;
+    Buffer faces;  // LampFace
+};
+
 // A part of a tile, behind whose pixels something may let light through: a picture of its own, whose rays then go elsewhere.
 struct ThroughPart {
     int x = 0, y = 0;  // its first pixel in the tile
@@ -154,9 +161,11 @@ struct TileInputs {
     ParticleHandles particles;
     Buffer all_light_rects;  // LightRect a light, all of any picture; where `through` is not empty
     bool has_cascades = false;
-    bool cascades_alone = false;  // no other light is shadowed by meshes
-    uint32_t mapped_light = 0;    // whose
+    uint32_t mapped_light = 0;  // whose
     CascadeHandles cascades;
+    bool has_lamps = false;
+    LampHandles lamps;
+    bool maps_alone = false;    // no light has rays for what meshes hide of it
     uint32_t volume_count = 0;  // lights that are rasterised
     Buffer volumes;             // their numbers
     bool upscales = false;      // with taa: the rays of a smaller picture are made into this one over time

@@ -16,8 +16,7 @@ KILN_CONST uint kLightsAtOnce = 16u;
 struct ShadowPush {
     uint first_light;  // of this batch, in the list of each tile
     uint more;         // 1: batches follow, sums are kept for them
-    uint mapped;       // number plus one of the light whose shadows of meshes come from cascades; 0: none
-    uint pad_0;
+    uint pad_0, pad_1;
 };
 
 #ifdef __cplusplus

@@ -14,9 +14,15 @@
 #include "shaders/through_enter.spv.h"
 #include "shaders/through_front.spv.h"
 #include "shaders/through_layer.spv.h"
+#include "shaders/through_mirror.spv.h"
+#include "shaders/through_mirrored.spv.h"
 #include "shaders/through_surface.spv.h"
 
 namespace kiln::render {
+
+namespace {
+constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
+}  // namespace
 
 const Kernel kMarchGlass{"march glass", kMarchGlassSpv};
 const Kernel kThroughBegin{"through begin", kThroughBeginSpv};
@@ -24,8 +30,12 @@ const Kernel kThroughLayer{"through layer", kThroughLayerSpv};
 const Kernel kThroughSurface{"through surface", kThroughSurfaceSpv};
 const Kernel kThroughEnter{"through enter", kThroughEnterSpv};
 const Kernel kThroughBend{"through bend", kThroughBendSpv};
+const Kernel kThroughBendImage{"through bend image", kThroughBendSpv, kWithImage};
 const Kernel kThroughEnd{"through end", kThroughEndSpv};
 const Kernel kThroughFront{"through front", kThroughFrontSpv};
+const Kernel kThroughMirror{"through mirror", kThroughMirrorSpv};
+const Kernel kThroughMirrored{"through mirrored", kThroughMirroredSpv};
+const Kernel kThroughMirroredImage{"through mirrored image", kThroughMirroredSpv, kWithImage};
 const Kernel kShadowGlass{"shadow glass", kShadowGlassSpv};
 const Kernel kMeshTrace{"mesh trace", kMeshTraceSpv};
 
@@ -80,6 +90,7 @@ const Buffer& or_any(const Buffer& buffer, const TileInputs& in) { return buffer
 struct Layer {
     Surface surface;
     Image light;
+    Surface lit;  // as it was lit
 };
 Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Image& carried, const ThroughPush& push) {
     TileInputs of_glass = in;
@@ -120,7 +131,31 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
                 g.write(lit.words)},
                push);
     out.light = light(g, in, lit.seen, lit);
+    out.lit = lit;
     return out;
+}
+
+// What is solid in the mirror that glass is, into the light of a layer that the camera's rays met.
+void mirror_solid(Graph& g, const TileInputs& tile, const ThroughPart& part, const TileInputs& in,
+                  const ThroughPush& push, Layer& layer) {
+    Buffer rays = g.create_buffer("through rays mirrored", uint64_t{in.size.width} * in.size.height * sizeof(FrameRay));
+    g.dispatch(kThroughMirror, in.size,
+               {g.uniform(in.frame), g.read(in.rays), g.read(in.instances.instances), g.read(layer.surface.seen),
+                g.read(layer.surface.words), g.write(rays)},
+               push);
+    TileInputs mirrored = in;
+    mirrored.rays = rays;
+    mirrored.frame = part.frame_of_rays;
+    mirrored.light_rects = tile.all_light_rects;
+    mirrored.lights_of_tile = tile.light_count;
+    const Solid solid = solid_along(g, mirrored);
+    Image both = g.create("through light mirrored", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    g.dispatch(
+        in.image_sky ? kThroughMirroredImage : kThroughMirrored, in.size,
+        {g.uniform(in.frame), g.read(in.rays), g.read(in.ggx_table), g.read(in.environment), g.read(layer.lit.seen),
+         g.read(layer.lit.words), g.read(layer.light), g.read(solid.light), g.write(both)},
+        push);
+    layer.light = both;
 }
 
 bool wants_front(const TileInputs& in) { return in.taa || in.particles.count > 0; }
@@ -132,6 +167,7 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
     in.frame = part.frame;
     in.light_rects = part.light_rects;
     in.lights_of_tile = part.lights_of_tile;
+    in.volume_count = 0;  // bent rays see no solids of lights as the rasteriser draws them
     ThroughPush push{.from_x = part.x,
                      .from_y = part.y,
                      .width = int(part.size.width),
@@ -151,8 +187,9 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
         push.passed = uint32_t(passed);
         push.last = passed == tile.transparent_layers ? 1 : 0;
         if (passed > 0) solid = solid_along(g, in);
-        Layer layer{{solid.seen, solid.light, solid.seen}, solid.light};  // not read in the last round
+        Layer layer{{solid.seen, solid.light, solid.seen}, solid.light, {}};  // not read in the last round
         if (push.last == 0) layer = layer_along(g, in, solid.seen, carried, push);
+        if (passed == 0 && push.last == 0 && in.has_glass) mirror_solid(g, tile, part, in, push, layer);
         Buffer rays = g.create_buffer("through rays", uint64_t{part.size.width} * part.size.height * sizeof(FrameRay));
         Image carried_now = g.create("through carried", {.size = in.size, .format = rhi::Format::Rgba16Float});
         Image sum_now = g.create("through sum", {.size = in.size, .format = rhi::Format::Rgba16Float});
@@ -169,13 +206,13 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
             inside.frame = part.frame_of_rays;
             seen_inside = solid_seen_along(g, inside);
         }
-        g.dispatch(
-            kThroughBend, in.size,
-            {g.uniform(in.frame), g.read(in.rays), g.read(or_any(i.instances, in)), g.read(or_any(i.sets, in)),
-             g.read(or_any(i.cells, in)), g.read(or_any(i.glass, in)), g.read(distances), g.read(layer.surface.seen),
-             g.read(layer.surface.words), g.read(layer.light), g.read(solid.light), g.read(carried), g.read(sum),
-             g.read(inside.rays), g.read(seen_inside), g.write(rays), g.write(carried_now), g.write(sum_now)},
-            push);
+        g.dispatch(in.image_sky ? kThroughBendImage : kThroughBend, in.size,
+                   {g.uniform(in.frame), g.read(in.rays), g.read(or_any(i.instances, in)), g.read(or_any(i.sets, in)),
+                    g.read(or_any(i.cells, in)), g.read(or_any(i.glass, in)), g.read(distances),
+                    g.read(layer.surface.seen), g.read(layer.surface.words), g.read(layer.light), g.read(solid.light),
+                    g.read(carried), g.read(sum), g.read(inside.rays), g.read(seen_inside), g.write(rays),
+                    g.write(carried_now), g.write(sum_now), g.read(in.environment)},
+                   push);
         carried = carried_now;
         sum = sum_now;
         if (passed == 0 && wants_front(tile)) {
@@ -241,12 +278,12 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
 
 void through_kernels(const TileInputs& in, std::vector<const Kernel*>& out) {
     if (!in.has_glass && !in.has_blends) return;
-    out.insert(out.end(),
-               {&kThroughBegin, &kThroughLayer, &kThroughSurface, &kThroughEnter, &kThroughBend, &kThroughEnd});
+    out.insert(out.end(), {&kThroughBegin, &kThroughLayer, &kThroughSurface, &kThroughEnter,
+                           in.image_sky ? &kThroughBendImage : &kThroughBend, &kThroughEnd});
     if (in.taa || in.has_particles) out.push_back(&kThroughFront);
     if (in.has_meshes) out.push_back(&kMeshTrace);
     if (!in.has_glass) return;
-    out.push_back(&kShadowGlass);
+    out.insert(out.end(), {&kShadowGlass, &kThroughMirror, in.image_sky ? &kThroughMirroredImage : &kThroughMirrored});
     out.insert(out.end(), {&kMarchGlass, &kResolveInstances});
     if (in.refine) out.push_back(&specialised(kRefineInstances, in.use_of_instances));
 }

@@ -33,7 +33,13 @@ layout(set = 0, binding = 16) uniform utexture2D seen_inside;                   
 layout(set = 0, binding = 17, std430) writeonly buffer RaysNext { FrameRay rays_next[]; };
 layout(set = 0, binding = 18, rgba16f) writeonly uniform image2D carried_now;
 layout(set = 0, binding = 19, rgba16f) writeonly uniform image2D sum_now;
+layout(set = 0, binding = 20, std430) readonly buffer Environment { uint environment_words[]; };
 layout(push_constant) uniform Push { ThroughPush push; };
+
+// True: an image is all around, multiplied by the constant sky.
+layout(constant_id = 6) const bool kImageSky = false;
+
+uint environment_word(uint i) { return environment_words[i]; }
 
 #define KILN_FROM_INSIDE
 #define KILN_FIELD_SURFACE
@@ -41,6 +47,7 @@ layout(push_constant) uniform Push { ThroughPush push; };
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
 #include "render/passes/through_glass.glsl"
+#include "render/lib/environment.gpu.h"
 
 const int kMostTurns = 12;  // inside one object
 
@@ -56,6 +63,7 @@ struct Way {
     float inside;     // voxels on the way
     float last;       // of them since it was thrown back last
     float reflected;  // share that is thrown back where it leaves
+    vec3 back, back_at;  // … and how that goes on
     bool caught;      // it does not
     bool stopped;     // by something solid inside
 };
@@ -63,7 +71,7 @@ struct Way {
 // Inside an object, from where a ray has come in; its first stretch goes no farther than t_solid.
 Way through_glass(InstanceRecord instance, GlassRecord g, vec3 at, vec3 direction, float t_solid) {
     float off = kOffVoxels / instance.voxels;
-    Way way = Way(at, direction, 0.0, 0.0, 0.0, false, false);
+    Way way = Way(at, direction, 0.0, 0.0, 0.0, direction, at, false, false);
     for (int i = 0; i < kMostTurns; ++i) {
         MarchHit hit = field_march(here.grid, object_ray(instance, way.at, way.direction), 0.0, kFarVoxels, true);
         float t = hit.t / instance.voxels;
@@ -81,6 +89,8 @@ Way through_glass(InstanceRecord instance, GlassRecord g, vec3 at, vec3 directio
         vec3 inwards = towards(unit_or(out_of_object(instance, dual_gradient(hit.slot, hit.cell, vec3(hit.voxel) + hit.p)), -way.direction), way.direction);
         float reflected = dielectric_reflectance(-dot(way.direction, inwards), g.ior);
         if (reflected < 1.0) {
+            way.back = reflect(way.direction, inwards);
+            way.back_at = way.at + inwards * off;
             way.direction = refracted(way.direction, inwards, g.ior);
             way.at -= inwards * off;
             way.reflected = reflected;
@@ -134,10 +144,17 @@ void main() {
                 direction = way.direction;
                 if (way.stopped) carried.a = kRayEnds;
                 vec3 absorbed = vec3(g.absorbed_red, g.absorbed_green, g.absorbed_blue) * frame.grid.voxel_size;
-                // What is thrown back where the ray leaves crosses the object again, and leaves in part, and so on: all of that is taken for as
-                // bright as what is seen along the ray. So glass keeps no light to itself.
-                vec3 leaves = (1.0 - way.reflected) / (1.0 - way.reflected * exp(-absorbed * way.last));
-                carried.rgb *= way.caught ? vec3(0.0) : enters * leaves * exp(-absorbed * way.inside);
+                vec3 inside = way.caught ? vec3(0.0) : carried.rgb * enters * exp(-absorbed * way.inside);
+                carried.rgb = inside * (1.0 - way.reflected);
+                // What is thrown back where the ray leaves crosses the object again and sees the sky where it comes out; what is thrown back there, and
+                // so on, is taken for as bright. So glass keeps no light to itself. What is nowhere to be seen adds nothing.
+                vec3 back = inside * way.reflected;
+                if (max(back.r, max(back.g, back.b)) > 1e-3) {
+                    Way other = through_glass(instance, g, way.back_at, way.back, kFarVoxels);
+                    vec3 sky = kImageSky ? environment_radiance(other.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, other.direction);
+                    vec3 leaves = (1.0 - other.reflected) / (1.0 - other.reflected * exp(-absorbed * other.last));
+                    if (!other.caught) sum.rgb += back * leaves * exp(-absorbed * other.inside) * sky;
+                }
             } else {
                 float opacity = float(words.x >> 24u) / 255.0;
                 sum.rgb += carried.rgb * opacity * light;
