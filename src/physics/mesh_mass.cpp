@@ -34,8 +34,7 @@ Result<MassProperties> mass_of_mesh(const Triangles& mesh) {
         dvec3 p[4] = {};
         for (size_t k = 0; k < 3; ++k) p[k] = to_double(mesh.vertices[mesh.indices[i + k]]) - from;
         const dvec3 across = cross(p[1] - p[0], p[2] - p[0]);
-        if (!(dot(across, across) > 0))
-            return refused(formatted("with triangle {} of no area: take it out", i / 3));
+        if (!(dot(across, across) > 0)) return refused(formatted("with triangle {} of no area: take it out", i / 3));
         const double six = dot(p[0], cross(p[1], p[2]));  // times the volume
         volume += six / 6;
         dvec3 sum{};
@@ -56,7 +55,7 @@ Result<MassProperties> mass_of_mesh(const Triangles& mesh) {
     const dvec3 c{x / (24 * volume), y / (24 * volume), z / (24 * volume)};
     const auto about = [&](double sum, double a, double b) { return sum / 120 - volume * a * b; };
     const double sxx = about(xx, c.x, c.x), syy = about(yy, c.y, c.y), szz = about(zz, c.z, c.z);
-    const double inertia[6] = {syy + szz, sxx + szz, sxx + syy, -about(xy, c.x, c.y), -about(xz, c.x, c.z),
+    const double inertia[6] = {syy + szz,           sxx + szz, sxx + syy, -about(xy, c.x, c.y), -about(xz, c.x, c.z),
                                -about(yz, c.y, c.z)};
     const dvec3 center = from + c;
     return principal(volume, {float(center.x), float(center.y), float(center.z)}, inertia);

@@ -3,12 +3,14 @@
 #include "physics/jolt/sdf_shape_jolt.h"
 
 #include "physics/jolt/jolt_world.h"
+#include "physics/sdf_collision.h"
 
 #include <Jolt/Core/Factory.h>
 #include <Jolt/Core/JobSystemSingleThreaded.h>
 #include <Jolt/Core/JobSystemThreadPool.h>
 #include <Jolt/Core/TempAllocator.h>
 #include <Jolt/Physics/Body/BodyCreationSettings.h>
+#include <Jolt/Physics/Collision/CollideShape.h>
 #include <Jolt/Physics/Collision/CollisionCollectorImpl.h>
 #include <Jolt/Physics/Collision/ContactListener.h>
 #include <Jolt/Physics/Collision/Shape/BoxShape.h>
@@ -121,7 +123,24 @@ public:
         system_.SetCombineRestitution([](const JPH::Body& a, const SubShapeID&, const JPH::Body& b, const SubShapeID&) {
             return std::max(a.GetRestitution(), b.GetRestitution());
         });
+        // Shapes that are fields have nothing behind their surface that pushes out whole (a ring is entered as deep as it is thick): what
+        // comes fast is met before it is there. All others keep to Jolt's own margin.
+        system_.SetSimCollideBodyVsBody([this](const JPH::Body& a, const JPH::Body& b, Mat44Arg transform_a,
+                                               Mat44Arg transform_b, CollideShapeSettings& how,
+                                               CollideShapeCollector& collector, const ShapeFilter& filter) {
+            const bool fields = a.GetShape()->GetSubType() == EShapeSubType::User1 &&
+                                b.GetShape()->GetSubType() == EShapeSubType::User1;
+            const auto turns = [](const JPH::Body& body) {
+                return body.GetAngularVelocity().Length() * body.GetShape()->GetLocalBounds().GetExtent().Length();
+            };
+            const auto speed = [&] {
+                return (a.GetLinearVelocity() - b.GetLinearVelocity()).Length() + turns(a) + turns(b);
+            };
+            how.mMaxSeparationDistance = fields ? reach_of(speed() * seconds_) : kMargin;
+            PhysicsSystem::sDefaultSimCollideBodyVsBody(a, b, transform_a, transform_b, how, collector, filter);
+        });
         PhysicsSettings physics;
+        physics.mSpeculativeContactDistance = kMostReach;  // how far boxes are looked for
         physics.mPenetrationSlop = 0.005f;
         physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
         physics.mNumVelocitySteps = kVelocitySteps;
@@ -273,6 +292,7 @@ protected:
             before.swap(touching_);
         }
         find_the_alone(before);
+        seconds_ = seconds;
         step_begins();
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
         step_ended();
@@ -374,6 +394,7 @@ private:
     std::vector<Pair> touching_;
     std::vector<int> moving_neighbours_;  // by index; a pair that touches at several places counts as often
     float damped_for_ = 0;                // the step that dampings are set for
+    float seconds_ = 0;                   // of the step that is under way
 };
 
 }  // namespace
