@@ -214,9 +214,9 @@ TEST_P(AtRest, RingsThatFallOnEachOtherAreMetBeforeTheyAreDeep) {
     const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
     for (int i = 0; i < 8; ++i)
         s.add({.shape = torus,
-               .pose = {{float(i % 2) * 0.5f, i < 4 ? 0.2f + 0.3f * float(i / 2) : 2.5f + 0.5f * float(i),
-                         uniform(-0.1f, 0.1f)},
-                        axis_angle({1, 0, 0}, i < 4 ? 0 : uniform(-0.4f, 0.4f))}});
+               .pose = {
+                   {float(i % 2), i < 4 ? 0.13f + 0.25f * float(i / 2) : 2.5f + 0.5f * float(i), uniform(-0.1f, 0.1f)},
+                   axis_angle({1, 0, 0}, i < 4 ? 0 : uniform(-0.4f, 0.4f))}});
     float deepest = 0;
     for (int i = 0; i < 120; ++i) {
         s.world->step(kStep);
