@@ -140,7 +140,7 @@ public:
             PhysicsSystem::sDefaultSimCollideBodyVsBody(a, b, transform_a, transform_b, how, collector, filter);
         });
         PhysicsSettings physics;
-        physics.mSpeculativeContactDistance = kMostReach;  // how far boxes are looked for
+        physics.mSpeculativeContactDistance = kMargin;  // how far boxes are looked for: more where fields move
         physics.mPenetrationSlop = 0.005f;
         physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
         physics.mNumVelocitySteps = kVelocitySteps;
@@ -219,6 +219,8 @@ protected:
         }
         object->id = interface().CreateAndAddBody(settings, fixed ? EActivation::DontActivate : EActivation::Activate);
         KILN_ASSERT(!object->id.IsInvalid(), "body {} of {}", index, kMostBodies);
+        object->moving_field = dynamic && settings.GetShape()->GetSubType() == EShapeSubType::User1;
+        look_for_fields(object->moving_field ? 1 : 0);
         object->damped = dynamic && (b.settings.linear_damping > 0 || b.settings.angular_damping > 0);
         objects_[index] = std::move(object);
         damped_for_ = 0;
@@ -323,12 +325,21 @@ private:
         std::shared_ptr<const Triangles> triangles;
         Ref<JPH::Shape> shape;
         BodyID id;
-        bool damped = false, stepped = false, alone = false;
+        bool damped = false, stepped = false, alone = false, moving_field = false;
     };
 
     // Between steps nobody else has the bodies.
     BodyInterface& interface() { return system_.GetBodyInterfaceNoLock(); }
+    void look_for_fields(int more) {
+        moving_fields_ += more;
+        PhysicsSettings physics = system_.GetPhysicsSettings();
+        const float wanted = moving_fields_ > 0 ? kMostReach : kMargin;
+        if (physics.mSpeculativeContactDistance == wanted) return;
+        physics.mSpeculativeContactDistance = wanted;
+        system_.SetPhysicsSettings(physics);
+    }
     void take_out(uint32_t index) {
+        look_for_fields(objects_[index]->moving_field ? -1 : 0);
         interface().RemoveBody(objects_[index]->id);
         interface().DestroyBody(objects_[index]->id);
         objects_[index].reset();
@@ -393,8 +404,9 @@ private:
     mutable std::mutex mutex_;  // of touching_
     std::vector<Pair> touching_;
     std::vector<int> moving_neighbours_;  // by index; a pair that touches at several places counts as often
-    float damped_for_ = 0;                // the step that dampings are set for
-    float seconds_ = 0;                   // of the step that is under way
+    int moving_fields_ = 0;
+    float damped_for_ = 0;  // the step that dampings are set for
+    float seconds_ = 0;     // of the step that is under way
 };
 
 }  // namespace
