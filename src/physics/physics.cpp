@@ -352,7 +352,6 @@ std::vector<BodyContact> World::touch_points(const Touch& touch) const {
     std::vector<FieldContact> found;
     ask(of.index, [&](const field::SdfField& field, const Pose& world) {
         const Pose local = inverse(world) * state(on).pose;
-        constexpr float kMargin = 0.02f;
         const SdfShape *solid = solid_of(*shape(on)), *other = solid_of(*shape(of));
         if (const Convex* convex = std::get_if<Convex>(shape(on))) {
             other != nullptr ? collide(*other, *convex, local, kMargin, found)

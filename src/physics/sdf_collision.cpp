@@ -268,22 +268,51 @@ struct Seed {
 };
 
 // The lowest points of groups of `shell` that come within reach of `other`, spread over where they touch: from each of them contacts are
-// looked for. `few` is how many there may be.
+// looked for. `few` is how many there may be. Asked in batches of what leads the walk from there: short fields are worth more lanes than
+// one, and need no bricks.
 void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_from_shell, float reach, size_t few,
                 std::vector<Seed>& out) {
-    std::array<float, 64> x, y, z, d;
+    constexpr int kBatch = 192;
+    std::array<float, kBatch> x, y, z, d;
+    std::array<const SdfShape::Group*, kBatch> whose;
+    thread_local std::vector<const SdfShape::Group*> near;
+    int count = 0;
+    const auto put = [&](vec3 p) {
+        x[size_t(count)] = p.x, y[size_t(count)] = p.y, z[size_t(count)] = p.z;
+        ++count;
+    };
+    const auto ask = [&] { other.slope().distances({x.data(), y.data(), z.data(), count}, d.data()); };
+    near.clear();
     out.clear();
     const Box3 box = other.bounds().inflated(reach);
+    const auto rule_out = [&] {
+        ask();
+        for (int i = 0; i < count; ++i)
+            if (!(d[size_t(i)] > whose[size_t(i)]->radius + reach)) near.push_back(whose[size_t(i)]);
+        count = 0;
+    };
     for (const SdfShape::Group& g : shell.groups()) {
         const vec3 center = other_from_shell * g.center;
-        if (!box.inflated(g.radius).contains(center) || other.bricks().distance(center) > g.radius + reach) continue;
-        for (int i = 0; i < g.count; ++i) {
-            const vec3 p = other_from_shell * shell.point(g.first + i);
-            x[size_t(i)] = p.x, y[size_t(i)] = p.y, z[size_t(i)] = p.z;
+        if (!box.inflated(g.radius).contains(center)) continue;
+        whose[size_t(count)] = &g;
+        put(center);
+        if (count == kBatch) rule_out();
+    }
+    if (count > 0) rule_out();
+    for (size_t first = 0; first < near.size();) {
+        size_t last = first;
+        for (; last < near.size() && count + near[last]->count <= kBatch; ++last)
+            for (int i = 0; i < near[last]->count; ++i) put(other_from_shell * shell.point(near[last]->first + i));
+        ask();
+        size_t from = 0;
+        for (; first < last; ++first) {
+            const size_t to = from + size_t(near[first]->count);
+            const size_t low =
+                size_t(std::min_element(d.begin() + std::ptrdiff_t(from), d.begin() + std::ptrdiff_t(to)) - d.begin());
+            if (d[low] < reach) out.push_back({{x[low], y[low], z[low]}, d[low]});
+            from = to;
         }
-        other.bricks().distances({x.data(), y.data(), z.data(), g.count}, d.data());
-        const size_t low = size_t(std::min_element(d.begin(), d.begin() + g.count) - d.begin());
-        if (d[low] < reach) out.push_back({{x[low], y[low], z[low]}, d[low]});
+        count = 0;
     }
     if (out.size() <= few) return;
     // The deepest, and then those farthest from all that were taken.

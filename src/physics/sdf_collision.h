@@ -23,6 +23,9 @@ struct FieldContact {
     vec3 normal;      ///< unit, out of the field's solid
     float depth = 0;  ///< metres into the solid, first order: -distance / |gradient|; negative where they are apart
 };
+/// How far apart contacts are looked for, metres: kMargin, and for two fields as far as they come nearer in a step, up to kMostReach.
+inline constexpr float kMargin = 0.02f, kMostReach = 0.2f;
+inline float reach_of(float way) { return way < kMargin ? kMargin : way < kMostReach ? way : kMostReach; }
 /// Contacts deeper than this say this: a body that was built over is pushed out at a walking pace, not shot out.
 inline constexpr float kMostDepth = 0.2f;
 inline constexpr size_t kMostContacts = 24;

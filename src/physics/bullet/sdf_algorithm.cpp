@@ -180,6 +180,13 @@ private:
 class FieldsAlgorithm final : public SdfAlgorithm {
 public:
     using SdfAlgorithm::SdfAlgorithm;
+    ~FieldsAlgorithm() override {
+        if (more_ != nullptr) m_dispatcher->releaseManifold(more_);
+    }
+    void getAllContactManifolds(btManifoldArray& all) override {
+        SdfAlgorithm::getAllContactManifolds(all);
+        if (more_ != nullptr) all.push_back(more_);
+    }
     struct Side {
         const SdfShape* sdf;
         Pose world;
@@ -192,16 +199,49 @@ public:
         const auto& shape = static_cast<const BulletSdfShape&>(*w->getCollisionShape());
         return {&shape.sdf(), world * inverse(shape.field_from_body()), shape.revision()};
     }
-    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const btDispatcherInfo&,
-                          btManifoldResult* result) override {
+    void processCollision(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b,
+                          const btDispatcherInfo& settings, btManifoldResult* result) override {
         const Side side_a = side_of(a), side_b = side_of(b);
         const Pose world_from_b = side_b.world;
         const Pose b_from_a = inverse(world_from_b) * side_a.world;
         if (as_before(b_from_a, side_a.revision + side_b.revision, result)) return;
-        collide(*side_a.sdf, *side_b.sdf, b_from_a, margin(), contacts_);
+        const auto velocity = [](const btCollisionObjectWrapper* w) {
+            return to_vec(w->getCollisionObject()->getInterpolationLinearVelocity());
+        };
+        // What comes fast is met before it is there.
+        const auto turns = [](const btCollisionObjectWrapper* w, const Side& side) {
+            const float turn = w->getCollisionObject()->getInterpolationAngularVelocity().length();
+            return turn > 0 ? turn * length(side.sdf->bounds().half_extents()) : 0;
+        };
+        const float speed = length(velocity(a) - velocity(b)) + turns(a, side_a) + turns(b, side_b);
+        const float reach = reach_of(speed * settings.m_timeStep);
+        collide(*side_a.sdf, *side_b.sdf, b_from_a, reach, contacts_);
+        // Four do not stop a ring that another comes through: what comes fast has the deepest of the others too.
+        if (reach > kMargin && contacts_.size() > 4) {
+            std::vector<FieldContact> others = contacts_;
+            keep_four(contacts_);
+            std::erase_if(others, [&](const FieldContact& c) {
+                return std::any_of(contacts_.begin(), contacts_.end(),
+                                   [&](const FieldContact& kept) { return kept.point == c.point; });
+            });
+            if (others.size() > 4) others.resize(4);  // they are sorted
+            if (more_ == nullptr) more_ = m_dispatcher->getNewManifold(manifold_->getBody0(), manifold_->getBody1());
+            more_->clearManifold();
+            more_->setContactBreakingThreshold(reach);
+            contacts_.swap(others);
+            result->setPersistentManifold(more_);
+            add(result, world_from_b, false);
+            contacts_.swap(others);
+        } else if (more_ != nullptr) {
+            more_->clearManifold();
+        }
+        manifold_->setContactBreakingThreshold(reach);
         result->setPersistentManifold(manifold_);
         add(result, world_from_b, false);
     }
+
+private:
+    btPersistentManifold* more_ = nullptr;  // of this step alone
 };
 
 template <typename Algorithm>

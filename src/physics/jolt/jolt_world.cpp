@@ -3,12 +3,14 @@
 #include "physics/jolt/sdf_shape_jolt.h"
 
 #include "physics/jolt/jolt_world.h"
+#include "physics/sdf_collision.h"
 
 #include <Jolt/Core/Factory.h>
 #include <Jolt/Core/JobSystemSingleThreaded.h>
 #include <Jolt/Core/JobSystemThreadPool.h>
 #include <Jolt/Core/TempAllocator.h>
 #include <Jolt/Physics/Body/BodyCreationSettings.h>
+#include <Jolt/Physics/Collision/CollideShape.h>
 #include <Jolt/Physics/Collision/CollisionCollectorImpl.h>
 #include <Jolt/Physics/Collision/ContactListener.h>
 #include <Jolt/Physics/Collision/Shape/BoxShape.h>
@@ -121,7 +123,24 @@ public:
         system_.SetCombineRestitution([](const JPH::Body& a, const SubShapeID&, const JPH::Body& b, const SubShapeID&) {
             return std::max(a.GetRestitution(), b.GetRestitution());
         });
+        // Shapes that are fields have nothing behind their surface that pushes out whole (a ring is entered as deep as it is thick): what
+        // comes fast is met before it is there. All others keep to Jolt's own margin.
+        system_.SetSimCollideBodyVsBody([this](const JPH::Body& a, const JPH::Body& b, Mat44Arg transform_a,
+                                               Mat44Arg transform_b, CollideShapeSettings& how,
+                                               CollideShapeCollector& collector, const ShapeFilter& filter) {
+            const bool fields = a.GetShape()->GetSubType() == EShapeSubType::User1 &&
+                                b.GetShape()->GetSubType() == EShapeSubType::User1;
+            const auto turns = [](const JPH::Body& body) {
+                return body.GetAngularVelocity().Length() * body.GetShape()->GetLocalBounds().GetExtent().Length();
+            };
+            const auto speed = [&] {
+                return (a.GetLinearVelocity() - b.GetLinearVelocity()).Length() + turns(a) + turns(b);
+            };
+            how.mMaxSeparationDistance = fields ? reach_of(speed() * seconds_) : kMargin;
+            PhysicsSystem::sDefaultSimCollideBodyVsBody(a, b, transform_a, transform_b, how, collector, filter);
+        });
         PhysicsSettings physics;
+        physics.mSpeculativeContactDistance = kMargin;  // how far boxes are looked for: more where fields move
         physics.mPenetrationSlop = 0.005f;
         physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
         physics.mNumVelocitySteps = kVelocitySteps;
@@ -200,6 +219,8 @@ protected:
         }
         object->id = interface().CreateAndAddBody(settings, fixed ? EActivation::DontActivate : EActivation::Activate);
         KILN_ASSERT(!object->id.IsInvalid(), "body {} of {}", index, kMostBodies);
+        object->moving_field = dynamic && settings.GetShape()->GetSubType() == EShapeSubType::User1;
+        look_for_fields(object->moving_field ? 1 : 0);
         object->damped = dynamic && (b.settings.linear_damping > 0 || b.settings.angular_damping > 0);
         objects_[index] = std::move(object);
         damped_for_ = 0;
@@ -273,6 +294,7 @@ protected:
             before.swap(touching_);
         }
         find_the_alone(before);
+        seconds_ = seconds;
         step_begins();
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
         step_ended();
@@ -303,12 +325,21 @@ private:
         std::shared_ptr<const Triangles> triangles;
         Ref<JPH::Shape> shape;
         BodyID id;
-        bool damped = false, stepped = false, alone = false;
+        bool damped = false, stepped = false, alone = false, moving_field = false;
     };
 
     // Between steps nobody else has the bodies.
     BodyInterface& interface() { return system_.GetBodyInterfaceNoLock(); }
+    void look_for_fields(int more) {
+        moving_fields_ += more;
+        PhysicsSettings physics = system_.GetPhysicsSettings();
+        const float wanted = moving_fields_ > 0 ? kMostReach : kMargin;
+        if (physics.mSpeculativeContactDistance == wanted) return;
+        physics.mSpeculativeContactDistance = wanted;
+        system_.SetPhysicsSettings(physics);
+    }
     void take_out(uint32_t index) {
+        look_for_fields(objects_[index]->moving_field ? -1 : 0);
         interface().RemoveBody(objects_[index]->id);
         interface().DestroyBody(objects_[index]->id);
         objects_[index].reset();
@@ -373,7 +404,9 @@ private:
     mutable std::mutex mutex_;  // of touching_
     std::vector<Pair> touching_;
     std::vector<int> moving_neighbours_;  // by index; a pair that touches at several places counts as often
-    float damped_for_ = 0;                // the step that dampings are set for
+    int moving_fields_ = 0;
+    float damped_for_ = 0;  // the step that dampings are set for
+    float seconds_ = 0;     // of the step that is under way
 };
 
 }  // namespace
