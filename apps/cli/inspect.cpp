@@ -52,7 +52,7 @@ std::string history_for_people(World& world) {
 }
 
 int inspect(const Options& o) {
-    auto world = o.history ? World::load(o.scene) : load_scene(o.scene);
+    auto world = o.history ? World::load(o.scene, 0, true) : load_scene(o.scene);
     if (!world) return fail(world.error());
     if (o.history) {
         (void)put(o.json ? world->history_json() : history_for_people(*world));

@@ -211,7 +211,10 @@ std::string report(const PictureOptions& o, std::string_view quality, const Rend
         .number("coarsened", frame.coarsened)
         .number("load_s", load)
         .number("total_s", total);
-    if (!stats.levels.empty()) json.raw("levels", levels_json(stats));
+    if (!stats.levels.empty())
+        json.raw("levels", levels_json(stats))
+            .number("net_bricks", stats.net_bricks)
+            .number("net_baked", stats.net_baked);
     if (stats.instances > 0) {
         Json own;
         own.number("count", stats.instances).number("bricks", stats.instance_bricks);
@@ -315,7 +318,10 @@ int render_sequence(const PictureOptions& o, RenderSettings settings, const Worl
             .number("bricks", stats.bricks)
             .number("evaluations", double(stats.evaluations));
         if (stats.clusters > 0) row.raw("mesh_clusters", clusters_json(stats));
-        if (!stats.levels.empty()) row.raw("levels", levels_json(stats));
+        if (!stats.levels.empty())
+            row.raw("levels", levels_json(stats))
+                .number("net_bricks", stats.net_bricks)
+                .number("net_baked", stats.net_baked);
         rows += (rows.empty() ? "" : ", ") + row.object();
     }
     progress.stage("");

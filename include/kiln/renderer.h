@@ -134,7 +134,7 @@ struct Frame {
     double time = 0, time_before = 0;  ///< seconds: what the meshes' animations show, and showed in the frame before
     std::vector<EditMotion> moved;     ///< for motion
     std::vector<Box3>
-        changed;  ///< where the field has become another since the frame before: nothing of it was anywhere
+        changed;  ///< where the field, or what is beside it, has become another since the frame before: none of it was anywhere
     std::vector<Particle> particles;
     std::vector<DebugLine> lines;  ///< of shaded pictures; later ones over earlier ones
 };
@@ -218,19 +218,20 @@ struct RenderStats {
         bool skipped = false;                          ///< its shell was more than the budget
     };
     std::vector<Level> levels;
-    int instances = 0;                   ///< drawn beside the field
-    uint32_t instance_bricks = 0;        ///< resident, of their sets
-    uint32_t instance_bricks_new = 0;    ///< … of them brought to the device by this frame
-    double instances_ms = 0;             ///< CPU time: their tree and records
-    uint64_t triangles = 0;              ///< of meshes, in the scene
-    uint64_t triangles_drawn = 0;        ///< given to the rasteriser
-    uint64_t clusters = 0;               ///< of up to 64 of them, of parts in the picture
-    uint64_t clusters_early = 0;         ///< drawn because the picture before showed them
-    uint64_t clusters_late = 0;          ///< drawn because nothing of this picture hides them
-    std::string march_tier = "compute";  ///< who marched the bricks: "compute", "rt"
-    std::string mesh_tier = "vertex";    ///< who drew meshes, where there are any: "vertex", "mesh"
-    uint32_t boxes = 0;                  ///< in the tree that rays are traced through
-    uint64_t box_tree_builds = 0;        ///< since creation
+    uint32_t net_bricks = 0, net_baked = 0;  ///< of what stands in where the last level has nothing yet
+    int instances = 0;                       ///< drawn beside the field
+    uint32_t instance_bricks = 0;            ///< resident, of their sets
+    uint32_t instance_bricks_new = 0;        ///< … of them brought to the device by this frame
+    double instances_ms = 0;                 ///< CPU time: their tree and records
+    uint64_t triangles = 0;                  ///< of meshes, in the scene
+    uint64_t triangles_drawn = 0;            ///< given to the rasteriser
+    uint64_t clusters = 0;                   ///< of up to 64 of them, of parts in the picture
+    uint64_t clusters_early = 0;             ///< drawn because the picture before showed them
+    uint64_t clusters_late = 0;              ///< drawn because nothing of this picture hides them
+    std::string march_tier = "compute";      ///< who marched the bricks: "compute", "rt"
+    std::string mesh_tier = "vertex";        ///< who drew meshes, where there are any: "vertex", "mesh"
+    uint32_t boxes = 0;                      ///< in the tree that rays are traced through
+    uint64_t box_tree_builds = 0;            ///< since creation
     uint64_t box_tree_bytes = 0;
     /// Of each of `passes`: bytes of the frame's own images and buffers that it reads and writes, each texel once.
     std::vector<std::pair<std::string, uint64_t>> pass_bytes;

@@ -134,12 +134,13 @@ public:
 
     /// A scene file with the commands of the journal beside it, or the name of a bundled scene. Errors read
     /// "FILE:LINE:COLUMN: path.to.key: what; what would be right".
-    /// `workers`: threads that read the journal, 0 for every core.
-    static Result<World> load(const std::string& path_or_name, int workers = 0);
+    /// `workers`: threads that read the journal, 0 for every core. `past`: with the steps before the last save, where they are known
+    /// (FILE.history), which open() always has.
+    static Result<World> load(const std::string& path_or_name, int workers = 0, bool past = false);
     static Result<World> parse(std::string_view json, const std::string& file_name);
     /// A scene file for editing: from now on every change is in the journal beside it (FILE.journal) before the call that made it
     /// returns. It survives the end of the process at once, a power cut after a tenth of a second; save() brings it into the scene
-    /// file. Fails while another program edits the scene. A change that the disk has no room for is refused and the world left as it was.
+    /// file, and its steps into FILE.history, so that undo reaches beyond it. Fails while another program edits the scene. A change that the disk has no room for is refused and the world left as it was.
     static Result<World> open(const std::string& path, int workers = 0);
     /// A world of one mesh edit that reads `model` (.glb .gltf .obj .off .ply .stl), with a camera that sees all of it. `scene` is where
     /// it will be saved: the edit names the model relative to that. Errors read "MODEL: what; what would be right".

@@ -2,10 +2,11 @@
 // Work is done in blocks of 16³ cells (cell_maker.h), several at a time; what they made is put in place by the owner's thread, in order, so
 // that with a budget in bricks alone nothing depends on the number of workers.
 //
-// Order of work: what is drawn of the last level, whatever it costs; changes, the oldest and finest first, with half of the budget where
-// cells are missing too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the
-// coarser level under it, and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window
-// just moved, so in a steady flight the last level's shells are made, within the budget, before they are seen.
+// Order of work: where something that is drawn of the last level is missing, the coarsest level of the net (clipmap_net.cpp), or without a
+// budget the last level itself, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are missing
+// too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser level under it,
+// and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window just moved, so in a
+// steady flight the last level's shells are made, within the budget, before they are seen.
 
 #include "field/clipmap.h"
 
@@ -23,7 +24,6 @@ namespace kiln::field {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr uint32_t kUnlimited = std::numeric_limits<uint32_t>::max();
 constexpr int kMostBlocksAtOnce = 64;
 
 CellBox common(const CellBox& a, const CellBox& b) {
@@ -59,25 +59,16 @@ CellBox cells_of(ivec3 block) { return {block, block + all_of(kBlockCells)}; }
 
 }  // namespace
 
-// What is left of a budget.
-struct Clipmap::Run {
-    uint32_t bricks = kUnlimited;
-    bool timed = false;
-    Clock::time_point deadline{};
-    int workers = 0;
-
-    bool goes_on() const { return bricks > 0 && !(timed && Clock::now() >= deadline); }
-    void spend(size_t n) {
-        if (bricks != kUnlimited) bricks -= uint32_t(std::min<size_t>(n, bricks));
-    }
-    // Blocks at once, so that each may make a good number of bricks and time is asked for often.
-    size_t wave(size_t queued) const {
-        size_t n = kMostBlocksAtOnce;
-        if (timed) n = 2 * size_t(workers != 0 ? workers : hardware_workers());
-        if (bricks != kUnlimited) n = std::min<size_t>(n, std::clamp(bricks / 64u, 1u, 16u));
-        return std::min(n, queued);
-    }
-};
+bool Clipmap::Run::goes_on() const { return bricks > 0 && !(timed && Clock::now() >= deadline); }
+void Clipmap::Run::spend(size_t n) {
+    if (bricks != kUnlimited) bricks -= uint32_t(std::min<size_t>(n, bricks));
+}
+size_t Clipmap::Run::wave(size_t queued) const {
+    size_t n = kMostBlocksAtOnce;
+    if (timed) n = 2 * size_t(workers != 0 ? workers : hardware_workers());
+    if (bricks != kUnlimited) n = std::min<size_t>(n, std::clamp(bricks / 64u, 1u, 16u));
+    return std::min(n, queued);
+}
 
 Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const ClipmapOptions& options,
                               dvec3 focus_world) {
@@ -98,13 +89,16 @@ Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const
     out.newest_ = std::move(program);
     out.pool_ = BrickPool(out.options_.max_bricks);
     out.focus_ = focus_world;
-    out.levels_.resize(size_t(options.levels));
-    for (int level = 0; level < options.levels; ++level) {
+    out.levels_.resize(size_t(options.levels + net_levels(options)));
+    out.nothing_ = CellMap::torus(options.cells);
+    each_cell({{}, all_of(options.cells)}, [&](ivec3 c) { out.nothing_.set(c.x, c.y, c.z, kCellMissing); });
+    for (int level = 0; level < out.all_levels(); ++level) {
         Level& l = out.levels_[size_t(level)];
-        l.cells = CellMap::torus(options.cells);
+        l.cells = out.nothing_;
+        l.counts.missing_cells = out.all_cells();
         l.program = out.newest_;
         l.first = out.first_cell_for(level, focus_world, nullptr);
-        out.enter(level, out.window(level));
+        if (level < options.levels) out.enter(level, out.window(level));
     }
     out.settle();
     return out;
@@ -124,9 +118,9 @@ LevelsParams Clipmap::params() const {
     out.part_x = float(at[0] - whole.x), out.part_y = float(at[1] - whole.y), out.part_z = float(at[2] - whole.z);
     out.cells = options_.cells;
     out.voxel_size = options_.voxel_size;
-    out.count = options_.levels;
-    const uint32_t all = uint32_t(options_.cells) * uint32_t(options_.cells) * uint32_t(options_.cells);
-    while (out.first + 1 < out.count && levels_[size_t(out.first)].counts.missing_cells == all) ++out.first;
+    out.drawn = options_.levels;
+    out.count = shown_levels();
+    while (out.first + 1 < out.count && levels_[size_t(out.first)].counts.missing_cells == all_cells()) ++out.first;
     return out;
 }
 
@@ -193,12 +187,13 @@ void Clipmap::enter(int level, const CellBox& box) {
 
 void Clipmap::move(dvec3 focus_world) {
     focus_ = focus_world;
-    for (int level = 0; level < options_.levels; ++level) {
+    for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
         l.counts.entered_cells = 0;
         l.counts.evicted = 0;
         const CellBox old = window(level);
         l.first = first_cell_for(level, focus_world, &l.first);
+        if (level >= options_.levels && l.counts.missing_cells == all_cells()) continue;
         const CellBox now = window(level);
         if (now.min == old.min) continue;
         std::erase_if(l.blocks, [&](ivec3 b) { return !meet(cells_of(b), now); });
@@ -206,6 +201,16 @@ void Clipmap::move(dvec3 focus_world) {
         if (!meet(old, now)) {
             enter(level, now);
             continue;
+        }
+        // Those beside cells that left are beside missing ones no more.
+        if (l.counts.missing_cells != 0) {
+            CellBox kept = common(old, now);
+            for (int ivec3::*const axis : {&ivec3::x, &ivec3::y, &ivec3::z}) {
+                CellBox edge = kept;
+                if (now.min.*axis > old.min.*axis) edge.max.*axis = edge.min.*axis + 1;
+                if (now.max.*axis < old.max.*axis) edge.min.*axis = edge.max.*axis - 1;
+                if (now.min.*axis != old.min.*axis) l.edges.push_back(edge);
+            }
         }
         CellBox rest = now;
         const auto shell = [&](int ivec3::*axis) {
@@ -249,15 +254,19 @@ void Clipmap::begin(Batch& batch, int level) const {
     add_parts(batch, window(level));
 }
 
+// The level has nothing that could show an old state.
+void Clipmap::forget_changes(Level& level) const {
+    level.program = newest_;
+    level.active.reset();
+    level.waiting.reset();
+}
+
 void Clipmap::edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes) {
     newest_ = std::move(program);
-    const int64_t all = int64_t(options_.cells) * options_.cells * options_.cells;
-    for (int level = 0; level < options_.levels; ++level) {
-        Level& l = levels_[size_t(level)];
-        if (l.counts.missing_cells == all) {  // nothing shows an old state
-            l.program = newest_;
-            l.active.reset();
-            l.waiting.reset();
+    for (Level& l : levels_) {
+        const int level = int(&l - levels_.data());
+        if (l.counts.missing_cells == all_cells()) {  // nothing shows an old state
+            forget_changes(l);
             continue;
         }
         std::optional<Batch>& batch = l.active ? l.waiting : l.active;
@@ -591,18 +600,22 @@ bool Clipmap::work(const BakeBudget& budget) {
     }
     room_ = false;
 
-    Run all{.workers = options_.workers};
-    const int last = options_.levels - 1;
-    fill(last, all, drawn(last));
-
     Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
     if (run.timed)
         run.deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
                                           std::chrono::duration<double>(std::max(budget.seconds, 0.0)));
-    run.spend(levels_[size_t(last)].counts.baked);
+    Run all{.workers = options_.workers};
+    const int last = options_.levels - 1;
+    const int coarsest = run.timed || run.bricks != kUnlimited ? all_levels() - 1 : last;
+    net_ = net_ || (coarsest > last && needs_net());
+    if (coarsest == last)
+        fill(last, all, drawn(last));
+    else if (net_)
+        fill_net(coarsest, all);
+    run.spend(levels_[size_t(coarsest)].counts.baked);
     std::vector<int> changes;
     bool missing = false;
-    for (int level = 0; level <= last; ++level) {
+    for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
         if (l.active) changes.push_back(level);
         // As many bricks as a sheet through the shell has, or twice that where a window is 64 cells.
@@ -625,11 +638,13 @@ bool Clipmap::work(const BakeBudget& budget) {
     } else {
         apply_all(run);
     }
-    for (int level = last; level >= 0; --level) {
-        if (levels_[size_t(level)].counts.skipped || !fill(level, run, window(level))) break;
-    }
+    bool whole = true;
+    for (int level = coarsest; level > last && net_ && whole; --level) whole = fill_net(level, run);
+    for (int level = last; level >= 0 && whole; --level)
+        whole = !levels_[size_t(level)].counts.skipped && fill(level, run, window(level));
     apply_all(run);
     for (Level& l : levels_) l.shell = 0;
+    if (net_ && !needs_net()) drop_net();
     settle();
     compact_code();
     return std::all_of(levels_.begin(), levels_.end(), [](const Level& l) { return l.blocks.empty() && !l.active; });
@@ -637,15 +652,14 @@ bool Clipmap::work(const BakeBudget& budget) {
 
 // Brings jumps, the marks of cells beside missing ones, and counts up to what changed.
 void Clipmap::settle() {
-    const int64_t all = int64_t(options_.cells) * options_.cells * options_.cells;
-    for (int level = 0; level < options_.levels; ++level) {
+    for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
         const CellBox window = this->window(level);
         int64_t cells = 0;
         for (const CellBox& box : l.changed) cells += volume(wider(box, kMaxJump - 1));
-        if (cells > all) l.changed.assign(1, window);
-        for (const CellBox& box : l.changed) {
-            each_cell(common(wider(box, 1), window), [&](ivec3 c) {
+        if (cells > int64_t(all_cells())) l.changed.assign(1, window);
+        const auto mark = [&](const CellBox& box) {
+            each_cell(common(box, window), [&](ivec3 c) {
                 const uint32_t word = l.cells.at(c.x, c.y, c.z);
                 if ((word & kCellOccupied) == 0 || word == kCellMissing) return;
                 bool beside = false;
@@ -655,6 +669,11 @@ void Clipmap::settle() {
                 }
                 l.cells.set(c.x, c.y, c.z, (word & ~kCellFades) | (beside ? kCellFades : 0u));
             });
+        };
+        for (const CellBox& box : l.edges) mark(box);
+        l.edges.clear();
+        for (const CellBox& box : l.changed) {
+            mark(wider(box, 1));
             const CellBox reached = wider(box, kMaxJump - 1);
             const ivec3 size = reached.max - reached.min;
             update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);

@@ -2,7 +2,7 @@
 // Clipmap: a field without an edge. Levels of cells around a focus (levels.gpu.h), each baked from the edits at its own resolution.
 // move() shifts windows: cells of the new shells are missing until work() has made them, coarse levels first, and the picture shows the next
 // coarser level there. edit() queues what a change reaches; a level shows it when all its bricks are made, the old ones until then. work()
-// keeps to a budget.
+// keeps to a budget; after a jump the picture is coarse at first, drawn from a net (clipmap_net.cpp) where the last level has nothing yet.
 //
 // At any time a level shows exactly one state of the world, level_program(): its bricks hold, bit for bit, the distances that a field of
 // that program built from nothing would, but for missing cells. Materials deep under cuts may differ from a field's, whose blocks of
@@ -15,6 +15,7 @@
 #include "field/levels.gpu.h"
 
 #include <array>
+#include <chrono>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -32,8 +33,11 @@ struct ClipmapOptions {
     int workers = 0;                 ///< 0: all cores
 };
 
-/// What one work() may cost. What is drawn of the last level is there at once, whatever it costs, or the picture would have a hole; it
-/// counts, and what comes into that level's window lies outside of what is drawn for a while, so that only jumps exceed the budget.
+/// A net's coarsest level needs no more bricks than this.
+inline constexpr uint32_t kNetBricks = 5 * 5 * 5;
+
+/// What one work() may cost. Whatever is said here, the coarsest level of the net is made at once where the picture has nothing else, or it
+/// would have a hole: kNetBricks bricks at most, which count. (More than 10 levels of 64 cells leave the net fewer than it wants: then more.)
 struct BakeBudget {
     uint32_t bricks = std::numeric_limits<uint32_t>::max();
     double seconds = std::numeric_limits<double>::infinity();  ///< asked between bricks: the last one ends late
@@ -66,6 +70,10 @@ public:
 
     const ClipmapOptions& options() const { return options_; }
     int level_count() const { return options_.levels; }
+    /// With those of the net, which come after the last.
+    int all_levels() const { return int(levels_.size()); }
+    /// Levels that the picture is drawn from now: all, while the net is out.
+    int shown_levels() const { return net_ ? all_levels() : options_.levels; }
     float voxel_size(int level) const { return options_.voxel_size * float(1 << level); }
     dvec3 focus() const { return focus_; }
     const LevelCounts& counts(int level) const { return levels_[size_t(level)].counts; }
@@ -147,11 +155,25 @@ private:
         std::vector<ivec3> blocks;     // that have missing cells
         std::vector<ivec3> refused;    // likewise, but no room
         std::vector<CellBox> changed;  // since settle()
+        std::vector<CellBox> edges;    // of the window, where cells beside left; likewise
         std::optional<Batch> active, waiting;
         uint32_t shell = 0;  // cells that entered since the last work()
         LevelCounts counts;
     };
-    struct Run;
+    using Clock = std::chrono::steady_clock;
+    static constexpr uint32_t kUnlimited = std::numeric_limits<uint32_t>::max();
+    // What is left of a budget.
+    struct Run {
+        uint32_t bricks = kUnlimited;
+        bool timed = false;
+        Clock::time_point deadline{};
+        int workers = 0;
+
+        bool goes_on() const;
+        void spend(size_t n);
+        // Blocks at once, so that each may make a good number of bricks and time is asked for often.
+        size_t wave(size_t queued) const;
+    };
 
     Clipmap() = default;
     ivec3 first_cell_for(int level, dvec3 focus, const ivec3* old) const;
@@ -166,6 +188,16 @@ private:
     void release(int level, uint32_t slot);
     uint32_t take_slot(int level, ivec3 cell);
     bool give_back(int level, ivec3 cell);
+    void forget_changes(Level& level) const;
+    static int net_levels(const ClipmapOptions& options);
+    CellBox net_part(int level) const;
+    bool has_missing(int level, const CellBox& box) const;
+    bool needs_net() const;
+    bool fill_net(int level, Run& run);
+    void drop_net();
+    uint32_t all_cells() const {
+        return uint32_t(options_.cells) * uint32_t(options_.cells) * uint32_t(options_.cells);
+    }
     void settle();
     void compact_code();
     float distance_cells(int level, ivec3 cell) const;
@@ -187,6 +219,8 @@ private:
     std::vector<Victim> victims_;  // of give_back(): bricks of a level, the farthest last
     int victims_level_ = -1;
     bool room_ = false;  // slots came free since cells were refused
+    bool net_ = false;   // the net is out
+    CellMap nothing_;    // of a level that has no cell
 };
 
 }  // namespace kiln::field

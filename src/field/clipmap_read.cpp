@@ -43,13 +43,13 @@ Clipmap::Sample Clipmap::sample(dvec3 p_world) const {
     Reader reader(*this);
     Sample out;
     const double h = double(options_.voxel_size);
-    for (int level = reader.levels.first; level < options_.levels; ++level) {
+    const double away =
+        std::max({std::fabs(p_world.x - focus_.x), std::fabs(p_world.y - focus_.y), std::fabs(p_world.z - focus_.z)});
+    for (int level = reader.levels.first; level < reader.levels.count; ++level) {
         const double size = h * double(1 << level);
         const double t[3] = {p_world.x / size, p_world.y / size, p_world.z / size};
-        const double away = std::max({std::fabs(p_world.x - focus_.x), std::fabs(p_world.y - focus_.y),
-                                      std::fabs(p_world.z - focus_.z)}) /
-                            size;
-        if (away >= double(level_reach(options_.cells))) continue;
+        if (away >= double(level_reach(options_.cells)) * h * double(1 << std::min(level, options_.levels - 1)))
+            continue;
         const ivec3 voxel{int(std::floor(t[0])), int(std::floor(t[1])), int(std::floor(t[2]))};
         const ivec3 cell{cell_of_texel(voxel.x), cell_of_texel(voxel.y), cell_of_texel(voxel.z)};
         const uint32_t word = cell_word(level, cell);

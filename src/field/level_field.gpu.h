@@ -102,10 +102,15 @@ KILN_FN void enter_brick(int level, uint word, ivec3 texel) {
     if (level + 1 >= levels.count) return;
     // The farthest corner is within half a brick of the distance of its middle.
     ivec3 middle = ivec3(texel.x + 3, texel.y + 3, texel.z + 3);
-    here_mixed = level_distance(level, middle) + 4.0f > level_fade_first(levels.cells);
+    here_mixed = level + 1 < levels.drawn && level_distance(level, middle) + 4.0f > level_fade_first(levels.cells);
     if ((word & kCellFades) == 0u) return;
-    here_mixed = true;
     ivec3 cell = ivec3(texel.x / kBrickVoxels, texel.y / kBrickVoxels, texel.z / kBrickVoxels);
+    // The net may come after the cells that are to lie on it.
+    if (level + 1 >= levels.drawn) {
+        ivec3 under = ivec3(cell.x >> 1, cell.y >> 1, cell.z >> 1);
+        if (!level_holds(level + 1, under) || level_word(level + 1, under) == kCellMissing) return;
+    }
+    here_mixed = true;
     for (int i = 0; i < 27; i++) {
         ivec3 step = ivec3(i % 3 - 1, (i / 3) % 3 - 1, i / 9 - 1);
         ivec3 other = ivec3(cell.x + step.x, cell.y + step.y, cell.z + step.z);
@@ -123,7 +128,9 @@ KILN_FN void enter_brick(int level, uint word, ivec3 texel) {
 KILN_FN float here_weight(ivec3 texel) {
     float away =
         level_distance(here_level, ivec3(here_texel.x + texel.x, here_texel.y + texel.y, here_texel.z + texel.z));
-    float w = (away - level_fade_first(levels.cells)) * (1.0f / level_fade_width(levels.cells));
+    float w = 0.0f;
+    if (here_level + 1 < levels.drawn)
+        w = (away - level_fade_first(levels.cells)) * (1.0f / level_fade_width(levels.cells));
     if (here_missing != 0u) {
         // Trilinear from the cell's corners: neighbours see the same on a shared face, and it is 1 all over a missing cell's.
         vec3 p = vec3(float(texel.x) * (1.0f / 7.0f), float(texel.y) * (1.0f / 7.0f), float(texel.z) * (1.0f / 7.0f));

@@ -44,7 +44,7 @@ KILN_FN LevelHit level_march(TexelRay ray, float t_min, float t_max, bool accele
         // The finest level whose box holds the point at t, and how far that stays so.
         int level = -1;
         float end = t_max;
-        for (int l = levels.count - 1; l >= first; l--) {
+        for (int l = levels.drawn - 1; l >= min(first, levels.drawn - 1); l--) {
             float enter = -kFarVoxels;
             float leave = kFarVoxels;
             float size = reach * float(1 << l);
@@ -66,6 +66,7 @@ KILN_FN LevelHit level_march(TexelRay ray, float t_min, float t_max, bool accele
             }
             break;
         }
+        level = max(level, first);
         if (t < known_from && known > level) {
             level = known;
             end = min(end, known_from);

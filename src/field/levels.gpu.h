@@ -33,10 +33,10 @@ struct LevelsParams {
     int cells;                      // a side, a power of two
     float part_x, part_y, part_z;   // of a voxel, from there to the focus
     float voxel_size;               // finest, metres
-    int count;                      // of levels
+    int count;                      // of levels, with those of the net where it is out (clipmap_net.cpp)
     int first;                      // the finest that has anything
     uint atlas_bricks_x_y;          // as in GridParams
-    uint pad_0;
+    int drawn;                      // of levels, without the net: it is seen only where the last of them has nothing
 };
 
 // First cell of a level's window, in world cells of the level (16 bytes).

@@ -72,7 +72,8 @@ uint64_t hash_of(const field::Clipmap& map, const field::Clipmap& other) {
 
 struct Flight {
     double mean_ms = 0, worst_ms = 0, bricks = 0, mib = 0;
-    uint64_t most_cells = 0;  // made by a frame beyond what entered and was still missing: none
+    uint64_t most_cells = 0;   // made by a frame beyond what entered and was still missing: none
+    uint64_t most_bricks = 0;  // made by a frame
 };
 
 class WorldRows {
@@ -122,15 +123,16 @@ private:
         uint64_t missing = 0, cells = 0, bricks = 0;
         const double seconds = seconds_of([&] {
             if (moves) map.move(at);
-            for (int level = 0; level < kLevels; ++level) missing += map.counts(level).missing_cells;
+            for (int level = 0; level < map.all_levels(); ++level) missing += map.counts(level).missing_cells;
             map.work({.bricks = kBudget});
         });
-        for (int level = 0; level < kLevels; ++level) {
+        for (int level = 0; level < map.all_levels(); ++level) {
             bricks += map.counts(level).baked;
             cells += map.counts(level).cells_made;
         }
         if (moves && cells > missing) flight.most_cells = std::max(flight.most_cells, cells - missing);
         flight.bricks += double(bricks);
+        flight.most_bricks = std::max(flight.most_bricks, bricks);
         flight.worst_ms = std::max(flight.worst_ms, seconds * 1e3);
         total += seconds * 1e3;
     }
@@ -143,10 +145,14 @@ private:
         if (flight.most_cells > 0)
             return run_.fail(
                 Error{formatted("bench world/{}: {} cells were made that had not entered", name, flight.most_cells)});
+        if (flight.most_bricks > kBudget)
+            return run_.fail(Error{formatted("bench world/{}: a frame made {} bricks, its budget is {}", name,
+                                             flight.most_bricks, kBudget)});
         const uint64_t was = hash_of(map, *fresh), is = hash_of(*fresh, map);
         run_.add_checked(row(name + ".mean", flight.mean_ms, "ms"), was, is);
         run_.add_checked(row(name + ".worst", flight.worst_ms, "ms"), was, is);
         run_.add_checked(row(name + ".bricks", flight.bricks, "bricks/frame"), was, is);
+        run_.add_checked(row(name + ".most", double(flight.most_bricks), "bricks"), was, is);
         run_.add_checked(row(name + ".memory", flight.mib, "MiB"), was, is);
     }
 

@@ -390,10 +390,12 @@ Result<void> GpuField::update(const field::Clipmap& next) {
 
     const uint64_t level_bytes = next.cells(0).words().size() * sizeof(uint32_t);
     bool kept = false;
-    if (auto r = reserve(cells_, "cells", level_bytes * uint64_t(next.level_count()), kept); !r) return fail(r.error());
-    for (int level = 0; level < next.level_count(); ++level) {
-        if (auto r = write_pages(cells_, level_bytes * uint64_t(level), next.cells(level).words(),
-                                 kept && old != nullptr ? &old->cells(level).words() : nullptr);
+    if (auto r = reserve(cells_, "cells", level_bytes * uint64_t(next.shown_levels()), kept); !r)
+        return fail(r.error());
+    for (int level = 0; level < next.shown_levels(); ++level) {
+        if (auto r = write_pages(
+                cells_, level_bytes * uint64_t(level), next.cells(level).words(),
+                kept && old != nullptr && level < old->shown_levels() ? &old->cells(level).words() : nullptr);
             !r)
             return fail(r.error());
     }
@@ -434,7 +436,7 @@ field::LevelsBlock GpuField::levels() const {
     field::LevelsBlock out{};
     out.params = levels_->params();
     out.params.atlas_bricks_x_y = bricks_x_ | bricks_y_ << 16;
-    for (int level = 0; level < levels_->level_count(); ++level) {
+    for (int level = 0; level < levels_->shown_levels(); ++level) {
         const field::ivec3 first = levels_->first_cell(level);
         out.places[level] = {first.x, first.y, first.z, 0};
     }
@@ -560,7 +562,7 @@ field::GridParams GpuField::grid() const {
     if (levels_) {
         // A finest cell less than the last level's box, so that what leaves it is looked at before levels end.
         const field::LevelsParams p = levels_->params();
-        const int reach = int(field::level_reach(p.cells)) << (p.count - 1);
+        const int reach = int(field::level_reach(p.cells)) << (p.drawn - 1);
         const auto first = [&](int focus) { return field::cell_of_texel(focus - reach) + 2; };
         const int size = 2 * reach / field::kBrickVoxels - 3;
         g = {first(p.focus_x), first(p.focus_y), first(p.focus_z), p.voxel_size, size, size, size, 0};

@@ -686,6 +686,10 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         stats.levels.push_back({double(frame.levels->voxel_size(level)), c.bricks, c.missing_cells, c.refused_cells,
                                 c.baked, c.evicted, c.entered_cells, c.skipped});
     }
+    for (int level = int(stats.levels.size()); levels && level < frame.levels->all_levels(); ++level) {
+        stats.net_bricks += frame.levels->counts(level).bricks;
+        stats.net_baked += frame.levels->counts(level).baked;
+    }
     stats.instances = int(frame.instances.size());
     stats.instance_bricks = instances->bricks();
     stats.instance_bricks_new = instances->bricks_new();

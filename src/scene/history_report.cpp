@@ -18,7 +18,7 @@ using What = Change::What;
 std::string words_of(const World::Impl& m, const Change& change, bool done) {
     const Edit* const held = change.get<Edit>();
     const uint32_t slot = m.edits.find(change.id);
-    // Branches that are not in the world may name edits that came and went: then there is only the number.
+    // Branches that are not in the world may name what came and went: then there is only the number.
     const std::string name = change.what == What::Presence && held != nullptr ? held->name
                              : slot != scene::EditList::kNone                 ? m.edits[slot].edit->name
                              : held != nullptr                                ? held->name
@@ -31,12 +31,13 @@ std::string words_of(const World::Impl& m, const Change& change, bool done) {
     case What::Order:
         return "reorder " + name;
     case What::Material:
-        return "material " + (change.id.index < m.data.materials.size()
-                                  ? m.data.materials[change.id.index].first
-                                  : change.get<std::pair<std::string, Material>>()->first);
+        if (change.id.index < m.data.materials.size()) return "material " + m.data.materials[change.id.index].first;
+        if (const auto* const away = change.get<std::pair<std::string, Material>>()) return "material " + away->first;
+        return formatted("material #{}", change.id.index);
     case What::Object:
-        return "object " + (change.id.index < m.data.objects.size() ? m.data.objects[change.id.index].name
-                                                                    : change.get<Object>()->name);
+        if (change.id.index < m.data.objects.size()) return "object " + m.data.objects[change.id.index].name;
+        if (const Object* const away = change.get<Object>()) return "object " + away->name;
+        return formatted("object #{}", change.id.index);
     case What::Field:
         return "field";
     case What::Lights:

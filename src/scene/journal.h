@@ -15,6 +15,7 @@
 
 #include <kiln/world.h>
 
+#include <memory>
 #include <string>
 
 namespace kiln::scene {

@@ -9,6 +9,7 @@
 #include "base/assert.h"
 #include "base/atomic_file.h"
 #include "base/format.h"
+#include "base/log.h"
 #include "base/parallel_for.h"
 
 #include <algorithm>
@@ -66,7 +67,7 @@ std::string side_file(const std::string& journal) {
 
 void discard_unfinished_files() noexcept { AtomicFile::remove_temporaries_from_signal(); }
 
-Result<World> World::load(const std::string& path_or_name, int workers) {
+Result<World> World::load(const std::string& path_or_name, int workers, bool past) {
     struct stat info {};
     const bool is_name = path_or_name.find('/') == std::string::npos && path_or_name.find('.') == std::string::npos;
     if (is_name && ::stat(path_or_name.c_str(), &info) != 0) {
@@ -82,14 +83,19 @@ Result<World> World::load(const std::string& path_or_name, int workers) {
     for (int attempt = 0;; ++attempt) {
         auto text = read_file(path_or_name);
         if (!text) return text.error();
-        const std::string journal = scene::journal_path(path_or_name);
-        if (::stat(path_or_name.c_str(), &info) != 0 || !S_ISREG(info.st_mode) || ::stat(journal.c_str(), &info) != 0 ||
-            !S_ISREG(info.st_mode))
-            return parse(*text, path_or_name);
+        const auto is_file = [&](const std::string& path) {
+            return ::stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
+        };
+        const std::string journal = scene::journal_path(path_or_name), history = scene::past_path(path_or_name);
+        const bool journaled = is_file(path_or_name) && is_file(journal);
+        past = past && is_file(path_or_name) && is_file(history);
+        if (!journaled && !past) return parse(*text, path_or_name);
         // Before its bytes are read: a writer that comes between the two is not there yet.
-        const bool held = RecordFile::is_held(journal);
-        const auto bytes = read_file(journal);
+        const bool held = journaled && RecordFile::is_held(journal);
+        const auto bytes = journaled ? read_file(journal) : Result<std::string>(std::string());
         if (!bytes) return bytes.error();
+        const auto before = past ? read_file(history) : Result<std::string>(std::string());
+        if (!before) return before.error();
         Records records = read_records(*bytes);
         // Someone who saves this instant has written one of the two files only.
         const bool foreign = scene::find_start(records, hash_of(*text)).foreign;
@@ -97,9 +103,10 @@ Result<World> World::load(const std::string& path_or_name, int workers) {
             std::this_thread::sleep_for(std::chrono::milliseconds(5));
             continue;
         }
-        World world;
+        bool lived = false;
+        World world = Impl::with_past(scene::records_to(*before, hash_of(*text)), *text, path_or_name, workers, lived);
         Impl& m = *world.impl_;
-        if (auto read = m.read_journaled(world, std::move(*text), path_or_name, *bytes, records, workers); !read)
+        if (auto read = m.read_journaled(world, std::move(*text), path_or_name, *bytes, records, lived, workers); !read)
             return read.error();
         if (held) {  // what is behind the last record may be one that is being written
             m.report->dropped_bytes = 0;
@@ -110,15 +117,17 @@ Result<World> World::load(const std::string& path_or_name, int workers) {
     }
 }
 
-// One record after another, as World::apply() does; steps are those of the world's own log.
+// One record after another, as World::apply() does; steps are those of the world's own log. Those of a past are counted anew from each of
+// its parts on, as the journal counted them.
 class Replay {
 public:
     Replay(World& world, World::Impl& impl, const scene::JournalStart& start, size_t records)
         : world_(world), m_(impl), step_of_(records + 1, kNone) {
-        step_of_[start.sequence] = scene::Log::kBeginning;
+        step_of_[start.sequence] = m_.log->now;
     }
 
-    Result<void> one(const JsonDocument& doc, uint32_t sequence) {
+    Result<void> one(const JsonDocument& doc, uint32_t place) {
+        const uint32_t sequence = place - before_;
         if (!doc.is(0, JsonType::Object) || doc.first(0) == doc.next(0)) return wrong("no record");
         const JsonIndex what = doc.first(0);
         const std::string_view key = doc.key(what);
@@ -136,6 +145,14 @@ public:
         }
         if (key == "step") return step(doc, what, sequence);
         if (key == "go") return go(doc, what);
+        if (key == "journal") {
+            const double next = doc.is(what, JsonType::Number) ? doc.number(what) : 0;
+            if (!(next >= 1 && next <= place) || log.depth != 0) return wrong("no part of a past");
+            before_ = place + 1 - uint32_t(next);
+            if (next == 1) std::fill(step_of_.begin(), step_of_.end(), kNone);
+            step_of_[size_t(next) - 1] = log.now;
+            return {};
+        }
         if (key == "saved") {
             if (log.depth != 0) return wrong("saved inside a group");
             step_of_[sequence] = log.now;
@@ -204,29 +221,31 @@ private:
     const scene::CommandNames names_ = m_.names();
     std::vector<uint32_t> step_of_;  // by the sequences of records
     uint32_t group_ = 0;
+    uint32_t before_ = 0;  // records that the journal does not count
     uint64_t commands_ = 0;
 };
 
-size_t World::Impl::replay(World& world, const Records& records, const scene::JournalStart& start, int workers) {
+size_t World::Impl::replay(World& world, std::span<const std::string_view> records, const scene::JournalStart& start,
+                           int workers) {
     keep_log(world);
-    log->steps[0].sequence = start.sequence;
+    log->steps[log->now].sequence = start.sequence;
     compile_later = true;
-    const auto adds = std::count_if(records.payloads.begin() + ptrdiff_t(start.first), records.payloads.end(),
+    const auto adds = std::count_if(records.begin() + ptrdiff_t(start.first), records.end(),
                                     [](std::string_view payload) { return payload.starts_with("{\"add\""); });
     edits.reserve(edits.size() + size_t(adds));
-    Replay replay(world, *this, start, records.payloads.size());
+    Replay replay(world, *this, start, records.size());
     // Texts are read side by side, commands one after another.
     constexpr size_t kBatch = 8192;
     std::vector<std::optional<Result<JsonDocument>>> documents(kBatch);
     size_t taken = start.first;
     bool good = true;
-    for (size_t first = start.first; first < records.payloads.size() && good; first += kBatch) {
-        const size_t count = std::min(kBatch, records.payloads.size() - first);
+    for (size_t first = start.first; first < records.size() && good; first += kBatch) {
+        const size_t count = std::min(kBatch, records.size() - first);
         parallel_for(
             count, workers,
             [&](int i) {
                 documents[size_t(i)].emplace(
-                    JsonDocument::parse(std::string(records.payloads[first + size_t(i)]), report->file));
+                    JsonDocument::parse(std::string(records[first + size_t(i)]), report->file));
             },
             64);
         for (size_t i = 0; i < count && good; ++i) {
@@ -248,10 +267,32 @@ size_t World::Impl::replay(World& world, const Records& records, const scene::Jo
     return taken;
 }
 
+bool World::Impl::relive(World& world, const Records& lead, const std::string& text, const std::string& scene,
+                         int workers) {
+    if (auto done = read(world, std::string(lead.payloads[0]), scene); !done) return false;
+    report.emplace().file = scene::past_path(scene);
+    const bool whole = replay(world, lead.payloads, {false, 1, 0}, workers) == lead.payloads.size();
+    report.reset();
+    log->lose_sequences();
+    // The writer tells every difference from the text that edits have their places in.
+    return whole && stand_on(text, scene) && hash_of(json(world)) == hash_of(text);
+}
+
+World World::Impl::with_past(const Records& lead, const std::string& text, const std::string& scene, int workers,
+                             bool& lived) {
+    World world;
+    lived = !lead.payloads.empty() && world.impl_->relive(world, lead, text, scene, workers);
+    if (lived || lead.payloads.empty()) return world;
+    log::warn("{}: does not lead to the scene; what was before the last save cannot be undone",
+              scene::past_path(scene));
+    return {};
+}
+
 Result<void> World::Impl::read_journaled(World& world, std::string text, const std::string& scene,
-                                         std::string_view bytes, Records& records, int workers) {
+                                         std::string_view bytes, Records& records, bool lived, int workers) {
     const scene::JournalStart start = scene::find_start(records, hash_of(text));
-    if (auto done = read(world, std::move(text), scene); !done) return done;
+    if (!lived)
+        if (auto done = read(world, std::move(text), scene); !done) return done;
     report.emplace().file = scene::journal_path(scene);
     // One without a record has nothing to lose, whatever it continues.
     const bool holds_nothing = records.has_header && records.payloads.empty() && records.fault.empty();
@@ -260,7 +301,7 @@ Result<void> World::Impl::read_journaled(World& world, std::string text, const s
     if (start.foreign) {
         records = {};
     } else {
-        const size_t taken = replay(world, records, start, workers);
+        const size_t taken = replay(world, records.payloads, start, workers);
         if (taken < records.payloads.size()) {
             const size_t end = size_t(records.payloads[taken].data() - bytes.data()) - kRecordHeaderBytes;
             records = read_records(bytes.substr(0, end));
@@ -281,9 +322,15 @@ Result<World> World::open(const std::string& path, int workers) {
     if (!text) return text.error();
     const Hash128 hash = hash_of(*text);
     Records records = read_records(bytes);
-    World world;
+    std::string past_bytes;
+    auto past = scene::Past::open(path, past_bytes);
+    if (!past) return past.error();
+    const Records lead = scene::records_to(past_bytes, hash);
+    const auto next = uint32_t(scene::find_start(records, hash).first + 1);
+    bool lived = false;
+    World world = Impl::with_past(lead, *text, path, workers, lived);
     Impl& m = *world.impl_;
-    if (auto read = m.read_journaled(world, std::move(*text), path, bytes, records, workers); !read)
+    if (auto read = m.read_journaled(world, std::move(*text), path, bytes, records, lived, workers); !read)
         return read.error();
     m.keep_log(world);
     JournalReport& report = *m.report;
@@ -303,9 +350,14 @@ Result<World> World::open(const std::string& path, int workers) {
     } else if (auto begun = file->restart(hash); !begun) {
         return begun.error();
     } else {
-        m.log->steps[0].sequence = 0;
+        m.log->steps[m.log->now].sequence = 0;
     }
     m.journal = std::make_unique<scene::Journal>(scene::Journal{path, std::move(*file)});
+    if (!lived)
+        past->begin(hash, next);
+    else if (auto ready = past->resume(lead, hash, next); !ready)
+        return ready.error();
+    m.past = std::make_unique<scene::Past>(std::move(*past));
     if (report.commands == 0 && report.dropped_bytes == 0) m.report.reset();
     return world;
 }
@@ -322,15 +374,24 @@ Result<void> World::Impl::compact(const World& world) {
     log->lose_sequences();
     log->steps[log->now].sequence = mark;
     if (auto written = file.flush(); !written) return written;
+    if (auto kept = past->take_in(*journal, hash); !kept) return kept;
     auto out = AtomicFile::create(journal->scene);
     if (!out) return out.error();
     if (auto written = out->write(text); !written) return written;
     if (auto written = out->commit(); !written) return written;
     // The scene file holds all. Where the journal cannot be emptied it goes on behind the mark.
-    if (auto begun = file.restart(hash); begun || file.bytes() == 0) log->steps[log->now].sequence = 0;
-    // As it would be if it were opened now.
-    auto again = scene::read_scene(std::move(text), journal->scene);
-    KILN_ASSERT(bool(again), "a scene that was saved cannot be read: {}", again ? "" : again.error().message);
+    const bool emptied = bool(file.restart(hash)) || file.bytes() == 0;
+    if (emptied) log->steps[log->now].sequence = 0;
+    past->saved(hash, emptied ? 1 : mark + 1);
+    const bool stands = stand_on(std::move(text), journal->scene);
+    KILN_ASSERT(stands, "{} was saved and cannot be read", journal->scene);
+    return {};
+}
+
+bool World::Impl::stand_on(std::string text, const std::string& scene) {
+    auto again = scene::read_scene(std::move(text), scene);
+    if (!again || again->edit_places.size() != edits.size() || again->object_places.size() != data.objects.size())
+        return false;
     log->lose_places();
     data.source = std::move(again->source);
     data.object_places = std::move(again->object_places);
@@ -338,7 +399,7 @@ Result<void> World::Impl::compact(const World& world) {
     std::vector<uint32_t> slots;
     edits.each([&](uint32_t slot) { slots.push_back(slot); });
     for (const uint32_t slot : slots) edits.set_place(slot, again->edit_places[i++]);
-    return {};
+    return true;
 }
 
 Result<void> World::save(const std::string& path) const {

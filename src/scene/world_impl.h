@@ -2,6 +2,7 @@
 // What a World holds: the scene's data, ids of edits, and what was compiled from them.
 #pragma once
 
+#include "scene/box_cover.h"
 #include "scene/command.h"
 #include "scene/edit_list.h"
 #include "scene/exact.h"
@@ -9,6 +10,7 @@
 #include "scene/history.h"
 #include "scene/journal.h"
 #include "scene/movers.h"
+#include "scene/past.h"
 #include "scene/scene_file.h"
 #include "scene/scene_meshes.h"
 #include "scene/sky_image.h"
@@ -77,6 +79,7 @@ struct World::Impl {
 
     std::unique_ptr<scene::Log> log;
     std::unique_ptr<scene::Journal> journal;
+    std::unique_ptr<scene::Past> past;  ///< beside a journal
     std::optional<JournalReport> report;
     /// While a journal is read: nothing is compiled until all is there.
     bool compile_later = false;
@@ -86,9 +89,17 @@ struct World::Impl {
     Result<void> read(World& world, std::string text, const std::string& name);
     Result<void> get_ready(World& world);
     /// Applies the records from `first` on, all or up to the first that cannot be; answers how many were taken.
-    size_t replay(World& world, const Records& records, const scene::JournalStart& start, int workers);
+    size_t replay(World& world, std::span<const std::string_view> records, const scene::JournalStart& start,
+                  int workers);
     Result<void> read_journaled(World& world, std::string text, const std::string& scene, std::string_view bytes,
-                                Records& records, int workers);
+                                Records& records, bool lived, int workers);
+    /// Becomes the scene of this text by way of its past; where that fails the world is good for nothing.
+    bool relive(World& world, const Records& lead, const std::string& text, const std::string& scene, int workers);
+    /// The world of this text with its past, where that leads there; else one without anything.
+    static World with_past(const Records& lead, const std::string& text, const std::string& scene, int workers,
+                           bool& lived);
+    /// The scene file's text is this now, which says what the world has: as if it were opened now. False where it does not.
+    bool stand_on(std::string text, const std::string& scene);
     Result<void> compact(const World& world);
 
     void adopt(std::vector<Edit> edits, const std::vector<scene::JsonIndex>& places);
@@ -169,8 +180,10 @@ struct World::Impl {
         Box3 reach;                ///< of all that it was since
     };
     bool has_shown = false;           ///< there was a frame
-    bool all_is_new = false;          ///< the list was compiled anew, or too much changed
+    bool all_is_new = false;          ///< the list was compiled anew
     std::map<uint32_t, Shown> shown;  ///< by slot
+    scene::BoxCover shown_beside;     ///< of what else changed
+    Box3 mover_box(uint32_t slot) const;
     void changed_since_frame(uint32_t slot, const Edit* was, uint32_t removed, uint32_t inserted);
     void motions_of(Frame& out);
 

@@ -15,7 +15,7 @@ namespace {
 
 constexpr float kForever = std::numeric_limits<float>::infinity();
 constexpr Box3 kEverywhere{{-kForever, -kForever, -kForever}, {kForever, kForever, kForever}};
-/// More edits than this are not followed one by one: each is asked of every pixel.
+/// More edits than this are not followed one by one: each is asked of every pixel. The others are covered by a few boxes.
 constexpr size_t kMostFollowed = 64;
 
 /// The same but for its place and its measures. Paint has no surface that could move.
@@ -30,33 +30,47 @@ bool same_thing(Edit a, const Edit& b) {
 /// `was`: what the slot's edit was before; `removed`, `inserted`: its rows.
 void World::Impl::changed_since_frame(uint32_t slot, const Edit* was, uint32_t removed, uint32_t inserted) {
     if (!has_shown || all_is_new) return;
+    Box3 reach;
+    for (const uint32_t row : {removed, inserted}) {
+        if (row == field::kNoRow || list.edits[row].count == 0) continue;
+        const sdf::EditSpan& span = list.edits[row];
+        reach = box_union(reach, span.everywhere() ? kEverywhere : span.indexed(row).influence(0));
+    }
+    reach = box_union(reach, mover_box(slot));
     if (shown.size() >= kMostFollowed && !shown.contains(slot)) {
-        all_is_new = true;
-        shown.clear();
+        shown_beside.add(reach);
         return;
     }
     const bool is_new = inserted != field::kNoRow && removed == field::kNoRow;
     const auto [at, first] = shown.try_emplace(slot);
     if (first && was != nullptr && !is_new) at->second.edit = *was;
-    for (const uint32_t row : {removed, inserted}) {
-        if (row == field::kNoRow || list.edits[row].count == 0) continue;
-        const sdf::EditSpan& span = list.edits[row];
-        at->second.reach =
-            box_union(at->second.reach, span.everywhere() ? kEverywhere : span.indexed(row).influence(0));
-    }
+    at->second.reach = box_union(at->second.reach, reach);
+}
+
+/// Of what the edit is a part of, where that stands apart.
+Box3 World::Impl::mover_box(uint32_t slot) const {
+    const auto found = mover_of.find(slot);
+    if (found == mover_of.end()) return {};
+    const scene::Mover& m = movers.at(found->second);
+    return m.apart ? scene::posed_box(*m.object, m.pose) : Box3{};
 }
 
 void World::Impl::motions_of(Frame& out) {
     const std::lock_guard lock(mutex);
-    if (has_shown && all_is_new) out.changed.push_back(kEverywhere);
+    if (all_is_new) shown_beside.add(kEverywhere);
     for (const auto& [slot, before] : shown) {
         const Edit* const now = slot < edits.slots() ? edits[slot].edit.get() : nullptr;
-        if (now == nullptr || !before.edit || !same_thing(*before.edit, *now)) {
-            if (now != nullptr || before.edit) out.changed.push_back(before.reach);
-        } else if (!(before.edit->node.transform == now->node.transform) && !mover_of.contains(slot)) {
+        if (now == nullptr && !before.edit) continue;  // it came and went
+        const bool same = now != nullptr && before.edit && same_thing(*before.edit, *now);
+        const bool stands = same && before.edit->node.transform == now->node.transform;
+        if (stands && before.edit->node.shape.params == now->node.shape.params) continue;
+        // What stands apart has a pose, and no other motion; what only has other measures, none.
+        if (same && !stands && !mover_of.contains(slot))
             out.moved.push_back({edits[slot].row, now->node.transform, before.edit->node.transform});
-        }
+        else
+            shown_beside.add(box_union(before.reach, mover_box(slot)));
     }
+    if (has_shown) out.changed.insert(out.changed.end(), shown_beside.boxes().begin(), shown_beside.boxes().end());
     // Dynamic edits whose rows are in the list, at their poses.
     for (auto& [key, m] : movers) {
         if (m.apart) continue;
@@ -69,6 +83,7 @@ void World::Impl::motions_of(Frame& out) {
         m.before = m.pose;
     }
     shown.clear();
+    shown_beside.clear();
     all_is_new = false;
     has_shown = true;
 }

@@ -392,6 +392,15 @@ TEST_F(Cli, ASceneIsSeenWithItsJournal) {
                 HasSubstr("\"title\": \"stroke\",\n      \"done\": false"));
     write("plain.kiln.json", kBall);
     EXPECT_EQ(run("diff plain.kiln.json s.kiln.json").out, "edits\n  + top\n");
+    // Saved, it is as it was.
+    write("saved.kiln.json", kBall);
+    {
+        auto world = kiln::World::open((folder_ / "saved.kiln.json").string());
+        ASSERT_TRUE(world && world->remove(*world->find_edit("ball")) &&
+                    world->save((folder_ / "saved.kiln.json").string()));
+    }
+    EXPECT_EQ(run("inspect saved.kiln.json --history").out, "> 1  remove ball\n");
+    EXPECT_EQ(run("diff plain.kiln.json saved.kiln.json").out, "edits\n  - ball\n");
     EXPECT_EQ(run("inspect plain.kiln.json --history").out, "no steps: the scene file holds all\n");
     // Broken: what is good is used, the rest is told and left alone.
     const std::string journal = read(folder_ / "s.kiln.json.journal");

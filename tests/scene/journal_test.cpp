@@ -496,8 +496,10 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
     for (int round = 0; round < rounds; ++round) {
         // The same from the same files, for the expected answer.
         fs::copy_file(scene, twin, fs::copy_options::overwrite_existing);
-        fs::remove(twin_folder / "s.kiln.json.journal");
-        if (fs::exists(journal)) fs::copy_file(journal, twin_folder / "s.kiln.json.journal");
+        for (const char* side : {"s.kiln.json.journal", "s.kiln.json.history"}) {
+            fs::remove(twin_folder / side);
+            if (fs::exists(folder / side)) fs::copy_file(folder / side, twin_folder / side);
+        }
         told->done = 0;
         const auto seed = uint32_t(random());
         ::setenv("KILN_JOURNAL_CHILD", folder.c_str(), 1);
@@ -536,12 +538,21 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
             same = compare_scenes(*left, *expected).equal;
         }
         ASSERT_TRUE(same) << "round " << round << ", after " << done << " calls\n" << lines;
+        // And all that was ever done can be undone, saves or not.
+        auto undone = World::load(scene, 1, true);
+        ASSERT_TRUE(undone) << undone.error().message;
+        ASSERT_TRUE(compare_scenes(*undone, *left).equal);
+        ASSERT_TRUE(undone->history().go_to(0));
+        ASSERT_TRUE(compare_scenes(*undone, *World::parse(kScene, "s.json")).equal)
+            << "round " << round << "\n"
+            << compare_scenes(*undone, *World::parse(kScene, "s.json")).lines;
         for (const auto& entry : fs::directory_iterator(folder))
             ASSERT_THAT(entry.path().filename().string(), testing::Not(HasSubstr("dropped")))
                 << left->journal_report()->sentence();
         // Large worlds make slow rounds.
         if (left->edits().size() > 300) {
             fs::remove(journal);
+            fs::remove(folder / "s.kiln.json.history");
             write(scene, kScene);
         }
         // A temporary that a kill left while saving is nobody's.

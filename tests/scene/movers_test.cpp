@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Bodies and dynamic edits: seen and asked where they are, as the scene says they are seen, and moved without baking.
+#include "scene/box_cover.h"
 #include "field/brick_set.h"
 #include "field/clipmap.h"
 #include "field/field.h"
@@ -335,11 +336,60 @@ TEST(Movers, AFrameSaysWhatOfItsFieldMovedSinceTheOneBefore) {
     ASSERT_TRUE(other);
     ASSERT_TRUE(world.remove(*other));
     EXPECT_TRUE(frame().changed.empty());
-    // So much that it is not told one by one.
-    for (int i = 0; i < 100; ++i) ASSERT_TRUE(world.add(added));
+    // Other measures at the same place.
+    e = *world.find(id_of(world, "g"));
+    e.node.shape = Sphere{.radius = 1.1f};
+    ASSERT_TRUE(world.change(id_of(world, "g"), e));
     f = frame();
+    EXPECT_TRUE(f.moved.empty());
     ASSERT_EQ(f.changed.size(), 1u);
-    EXPECT_FALSE(f.changed[0].finite());
+    EXPECT_LE(f.changed[0].min.y, -2.2f);
+}
+
+// More than are told one by one: a few boxes that have them all, and are no larger than they must be.
+TEST(Movers, ManyChangesAreCoveredByFewBoxes) {
+    World world = parsed(std::string("{") + kField + R"(, "edits": [
+        {"id": "g", "shape": "sphere", "radius": 1.2, "position": [0, -1, 0]}]})");
+    (void)*world.frame();
+    std::vector<Box3> places;
+    for (int i = 0; i < 1000; ++i) {
+        Edit added;
+        added.node.shape = Sphere{.radius = 0.1f};
+        // Eight heaps far from each other.
+        added.node.transform.position = {float(20 * (i & 1)) + 0.001f * float(i), float(20 * (i >> 1 & 1)),
+                                         float(20 * (i >> 2 & 1))};
+        ASSERT_TRUE(world.add(added));
+        const vec3 p = added.node.transform.position;
+        places.push_back({p - vec3{0.1f, 0.1f, 0.1f}, p + vec3{0.1f, 0.1f, 0.1f}});
+    }
+    const Frame f = *world.frame();
+    EXPECT_LE(f.changed.size(), scene::BoxCover::kMost);
+    for (const Box3& place : places)
+        EXPECT_TRUE(
+            std::any_of(f.changed.begin(), f.changed.end(), [&](const Box3& b) { return box_union(b, place) == b; }));
+    for (const Box3& b : f.changed) EXPECT_LT(length(b.max - b.min), 5) << "far from all heaps history stays";
+    EXPECT_TRUE(world.frame()->changed.empty());
+}
+
+TEST(Movers, WhatStandsApartAndBecomesAnotherThingHasNoHistoryWhereItWasAndIs) {
+    World world = parsed(std::string("{") + kField + R"(, "edits": [
+        {"id": "g", "shape": "box", "half_extents": [3, 0.2, 3], "position": [0, -1, 0]},
+        {"id": "d", "shape": "sphere", "radius": 0.4, "position": [0, 1, 0], "dynamic": true}]})");
+    (void)*world.frame();
+    ASSERT_TRUE(world.move(id_of(world, "d"), Pose{{2, 1, 0}, {}}));
+    EXPECT_TRUE(world.frame()->changed.empty()) << "moving has motion";
+    Edit e = *world.find(id_of(world, "d"));
+    e.node.shape = Sphere{.radius = 0.5f};
+    ASSERT_TRUE(world.change(id_of(world, "d"), e));
+    const Frame f = *world.frame();
+    ASSERT_EQ(f.instances.size(), 1u);
+    ASSERT_EQ(f.changed.size(), 1u);
+    for (const Pose& pose : {Pose{{2, 1, 0}, {}}, f.instances[0].pose}) {
+        const vec3 p = pose.position;
+        EXPECT_TRUE(box_union(f.changed[0], Box3{p, p}) == f.changed[0]) << p.x;
+    }
+    EXPECT_LT(f.changed[0].max.x, 3);
+    EXPECT_TRUE(world.frame()->changed.empty());
 }
 
 // A brush stroke of more edits than once made a field begin anew, in a larger world.

@@ -56,7 +56,7 @@ void main() {
                 moved = placed_by(edit.before_x, edit.before_y, edit.before_z, now) - now;
             }
         }
-        if (of_field && was_nowhere(now)) {
+        if (state != kSeenMesh && was_nowhere(now)) {
             imageStore(motion, pixel, vec4(kOffScreen, 1.0, 0.0));
             return;
         }

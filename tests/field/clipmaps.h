@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: MIT
+// What tests of clipmaps share: a country to look at, and what must hold of any clipmap at any time.
+#pragma once
+
+#include "field/clipmap.h"
+
+#include "base/hash.h"
+#include "sdf/eval.h"
+#include "worlds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <string>
+
+namespace kiln::field {
+
+// A ground with lumps, pits and thin things on it, over 160 m.
+inline std::vector<Edit> country(int count = 160, uint32_t seed = 3, float blend = 0.5f) {
+    worlds::Random r(seed);
+    std::vector<Edit> edits{worlds::edit(Plane{}, {0, -0.13f, 0})};
+    for (int i = 0; i < count; ++i) {
+        const float spread = i % 3 == 0 ? 6.0f : 60.0f;
+        const vec3 at{r.in(-spread, spread), r.in(-1, 1), r.in(-spread, spread)};
+        Edit e;
+        switch (r.below(4)) {
+        case 0:
+            e = worlds::edit(Sphere{.radius = r.in(0.4f, 4)}, at, Op::Union, r.in(0, blend));
+            break;
+        case 1:
+            e = worlds::edit(Box{.half_extents = {r.in(0.1f, 2), r.in(0.3f, 3), r.in(0.1f, 2)}}, at);
+            break;
+        case 2:
+            e = worlds::edit(Sphere{.radius = r.in(0.4f, 3)}, at, Op::Subtract, r.in(0, 0.6f * blend));
+            break;
+        default:
+            e = worlds::edit(Capsule{.half_height = r.in(0.5f, 3), .radius = r.in(0.05f, 0.3f)}, at);
+            break;
+        }
+        e.node.transform.rotation = axis_angle(r.direction(), r.in(-3, 3));
+        // A cut with a material, inside a later one, shows where blocks of cells begin: fields begin them elsewhere.
+        if (e.op == Op::Union) e.node.material = MaterialId{uint32_t(r.below(5)), 0};
+        edits.push_back(e);
+    }
+    return edits;
+}
+
+inline Clipmap made(std::shared_ptr<const sdf::Program> program, dvec3 focus, ClipmapOptions options) {
+    auto out = Clipmap::make(std::move(program), options, focus);
+    EXPECT_TRUE(out) << (out ? "" : out.error().message);
+    return std::move(*out);
+}
+inline constexpr ClipmapOptions kSmall{.voxel_size = 0.05f, .levels = 4, .cells = 32};
+
+inline uint64_t hash_of(const BrickContent& brick) {
+    uint64_t sum = brick.half ? hash64_of(std::span<const uint16_t>(brick.half->codes))
+                              : hash64_of(std::span<const uint8_t>(brick.bytes->codes));
+    sum = hash_combine(sum, brick.material);
+    if (!brick.materials) return sum;
+    sum = hash_combine(sum, hash64_of(std::span<const uint16_t>(brick.materials->words)));
+    return hash_combine(sum, hash64_of(std::span<const uint32_t>(brick.materials->palette)));
+}
+
+inline void each_cell(const CellBox& box, const std::function<void(ivec3)>& fn) {
+    for (int z = box.min.z; z < box.max.z; ++z) {
+        for (int y = box.min.y; y < box.max.y; ++y) {
+            for (int x = box.min.x; x < box.max.x; ++x) fn({x, y, z});
+        }
+    }
+}
+
+// Every cell that is there has, to the byte, the distances of a field of the level's program. (Materials deep under a cut may differ: they
+// depend on where blocks of cells begin, which is elsewhere in a field. Clipmaps are compared with each other to the last byte.)
+inline void expect_is_its_program(const Clipmap& map, int level, const std::string& when) {
+    const CellBox window = map.window(level);
+    const float h = map.voxel_size(level), side = h * kBrickVoxels;
+    const auto middle = [&](ivec3 c) {
+        return vec3{(float(c.x) + 0.5f) * side, (float(c.y) + 0.5f) * side, (float(c.z) + 0.5f) * side};
+    };
+    auto built =
+        HostBricks::build(map.level_program(level), {.voxel_size = h,
+                                                     .bounds = {middle(window.min), middle(window.max - all_of(1))},
+                                                     .own_voxels = kLevelOwnVoxels});
+    ASSERT_TRUE(built);
+    ASSERT_EQ(built->field().grid().cell_x, window.min.x);
+    ASSERT_EQ(built->field().grid().size_z, window.max.z - window.min.z);
+    uint32_t missing = 0, bricks = 0;
+    int wrong = 0;
+    each_cell(window, [&](ivec3 c) {
+        const uint32_t word = map.cell_word(level, c), want = built->field().cell_word(c.x, c.y, c.z);
+        if (word == kCellMissing) {
+            ++missing;
+            return;
+        }
+        const bool brick = (word & kCellOccupied) != 0;
+        bricks += brick;
+        bool same = brick == ((want & kCellOccupied) != 0);
+        if (same && !brick) same = (word & kCellInside) == (want & kCellInside);
+        if (same && brick) {
+            const BrickRecord& record = map.records()[word & kCellSlotMask];
+            same = map.content(word & kCellSlotMask).half->codes == built->content(want & kCellSlotMask).half->codes &&
+                   record.texel_x == c.x * 7 && record.texel_y == c.y * 7 && record.texel_z == c.z * 7 &&
+                   record.level == uint32_t(level) && record.code_count > 0;
+        }
+        if (!same && ++wrong < 4)
+            ADD_FAILURE() << when << ": level " << level << " cell " << c.x << " " << c.y << " " << c.z << ": word "
+                          << word << ", a field has " << want;
+    });
+    EXPECT_EQ(wrong, 0);
+    EXPECT_EQ(missing, map.counts(level).missing_cells) << when << " level " << level;
+    EXPECT_EQ(bricks, map.counts(level).bricks) << when << " level " << level;
+}
+inline void expect_is_its_program(const Clipmap& map, const std::string& when) {
+    for (int level = 0; level < map.level_count(); ++level) expect_is_its_program(map, level, when);
+}
+
+// Marks beside missing cells, and that a jump never leads over anything but air of one sign.
+inline void expect_true_words(const Clipmap& map, int level) {
+    const CellBox window = map.window(level);
+    int wrong = 0;
+    each_cell(window, [&](ivec3 c) {
+        const uint32_t word = map.cell_word(level, c);
+        if (word == kCellMissing || wrong > 3) return;
+        const bool brick = (word & kCellOccupied) != 0;
+        const int reach = brick ? 1 : int(word & 7u) - 1;
+        ASSERT_GE(reach, 0);
+        bool beside = false;
+        for (int z = -reach; z <= reach; ++z) {
+            for (int y = -reach; y <= reach; ++y) {
+                for (int x = -reach; x <= reach; ++x) {
+                    const ivec3 n = c + ivec3{x, y, z};
+                    if (!contains(window, n)) continue;
+                    const uint32_t other = map.cell_word(level, n);
+                    beside = beside || other == kCellMissing;
+                    if (!brick && (other & (kCellOccupied | kCellInside)) != (word & kCellInside)) {
+                        ADD_FAILURE() << "level " << level << ": a jump leads over a cell of another kind";
+                        ++wrong;
+                        return;
+                    }
+                }
+            }
+        }
+        if (brick && beside != ((word & kCellFades) != 0)) {
+            ADD_FAILURE() << "level " << level << ": mark " << !beside << " beside " << beside;
+            ++wrong;
+        }
+    });
+}
+
+inline uint64_t hash_of_bricks(const Clipmap& map) {
+    uint64_t sum = 0;
+    for (int level = 0; level < map.level_count(); ++level) {
+        each_cell(map.window(level), [&](ivec3 c) {
+            const uint32_t word = map.cell_word(level, c);
+            const bool brick = (word & kCellOccupied) != 0 && word != kCellMissing;
+            sum = hash_combine(
+                sum, brick ? hash_of(map.content(word & kCellSlotMask)) : word & (kCellMissing | kCellInside));
+        });
+    }
+    return sum;
+}
+
+// Missing cells of the last level that are drawn and have nothing under them.
+inline int holes(const Clipmap& map) {
+    const int last = map.level_count() - 1;
+    int out = 0;
+    each_cell(map.drawn(last), [&](ivec3 c) {
+        bool there = false;
+        for (int level = last; level < map.shown_levels(); ++level) {
+            const int by = level - last;
+            const ivec3 over{c.x >> by, c.y >> by, c.z >> by};
+            there = there || (contains(map.window(level), over) && map.cell_word(level, over) != kCellMissing);
+        }
+        out += !there;
+    });
+    return out;
+}
+
+// By the last work(), of all levels.
+inline uint32_t baked(const Clipmap& map) {
+    uint32_t out = 0;
+    for (int level = 0; level < map.all_levels(); ++level) out += map.counts(level).baked;
+    return out;
+}
+
+inline double exact(const sdf::Program& program, dvec3 p) { return sdf::evaluate(sdf::view(program), p); }
+
+}  // namespace kiln::field
