@@ -20,15 +20,28 @@ vec3 origin_of_block(ivec3 block, float voxel_size) {
     return {axis(block.x), axis(block.y), axis(block.z)};
 }
 
-CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size) {
+// How much farther than `far` an edit matters, since later ones that blend lead its values on: see edit_index.cpp. What is gone has no
+// place in the list: every other may be later.
+static float later_reaches(const sdf::Program& program, const sdf::IndexedEdit& edit, float far, bool gone) {
+    const float most = program.index.blend_allowance(edit.influence(far), far, edit.row);
+    if (most == 0 || gone) return most;
+    std::vector<uint32_t> rows;
+    program.index.find(edit.influence(far + most), far + most, rows);
+    sdf::BlendAllowance out;
+    for (const uint32_t row : rows) {
+        if (program.edits[row].order > program.edits[edit.row].order) out.add(program.edits[row].reach);
+    }
+    return out.metres();
+}
+
+CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool gone) {
     const sdf::EditSpan& span = program.edits[row];
     if (span.count == 0) return {};
-    if (span.everywhere()) return {all_of(-kFarCell), all_of(kFarCell)};
-    const float far = influence_reach(voxel_size);
-    const sdf::IndexedEdit edit = span.indexed(row);
-    const float more = program.index.blend_allowance(edit.influence(far), far, row);
-    const Box3 box = edit.influence(far + more);
-    const double side = double(voxel_size) * kBrickVoxels;
+    if (span.everywhere()) {
+        const CellBox all{all_of(-kFarCell), all_of(kFarCell)};
+        return {all, all};
+    }
+    const double side = double(lattice.voxel_size) * kBrickVoxels;
     const auto cell = [&](double at) { return int(std::clamp(std::floor(at), double(-kFarCell), double(kFarCell))); };
     // Far out, boxes are rounded where they lie.
     const auto more_cells = [&](float a) {
@@ -36,7 +49,14 @@ CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_siz
     };
     const auto low = [&](float a) { return cell(double(a) / side - more_cells(a)); };
     const auto high = [&](float a) { return cell(double(a) / side + more_cells(a)) + 1; };
-    return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
+    const auto cells = [&](const Box3& box) -> CellBox {
+        return {{low(box.min.x), low(box.min.y), low(box.min.z)}, {high(box.max.x), high(box.max.y), high(box.max.z)}};
+    };
+    const float far = influence_reach(lattice.voxel_size);
+    const sdf::IndexedEdit edit = span.indexed(row);
+    const float more = later_reaches(program, edit, far, gone);
+    const float own = (lattice.own_voxels + 0.01f) * lattice.voxel_size;
+    return {cells(edit.influence(far + more)), cells(edit.influence(own + more))};
 }
 
 bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,

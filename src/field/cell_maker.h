@@ -44,8 +44,12 @@ inline bool meet(const CellBox& a, const CellBox& b) {
 }
 inline ivec3 all_of(int a) { return {a, a, a}; }
 
-/// World cells whose bricks an edit can change; far beyond any world where it is everywhere. Empty: none.
-CellBox cells_reached(const sdf::Program& program, uint32_t row, float voxel_size);
+/// World cells that an edit can change, one of the program or one that is `gone` from it; far beyond any world where it is everywhere.
+struct CellsReached {
+    CellBox stored;  ///< what their bricks hold. Empty: none
+    CellBox owned;   ///< whether they own bricks: elsewhere, what is empty stays so
+};
+CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool gone);
 
 /// Whether a brick's code stays what it was when `rows`, in ascending order, go, and it would begin so.
 bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,

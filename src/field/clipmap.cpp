@@ -245,7 +245,7 @@ void Clipmap::add_parts(Batch& batch, const CellBox& clip) const {
 void Clipmap::begin(Batch& batch, int level) const {
     for (const std::vector<uint32_t>* rows : {&batch.removed, &batch.inserted}) {
         for (const uint32_t row : *rows) {
-            const CellBox box = cells_reached(*batch.program, row, voxel_size(level));
+            const CellBox box = cells_reached(*batch.program, row, lattice(level, {}), rows == &batch.removed).stored;
             if (!box.empty()) batch.boxes.push_back(box);
         }
     }

@@ -108,11 +108,15 @@ private:
                    std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
         }
         bool wants(ivec3 cell) const {
-            if (earlier.data() != nullptr)
-                return std::none_of(earlier.begin(), earlier.end(),
-                                    [&](const CellBox& b) { return contains(b, cell); });
-            return whole() ||
-                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return contains(b, cell); });
+            if (whole()) return true;
+            const auto has_cell = [&](const CellBox& b) { return contains(b, cell); };
+            if (earlier.data() != nullptr) {
+                if (std::any_of(earlier.begin(), earlier.end(), has_cell)) return false;
+            } else if (std::none_of(dirty.begin(), dirty.end(), has_cell)) {
+                return false;
+            }
+            const bool may_own = std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
+            return may_own || (builder.old_->cells_.at(cell.x, cell.y, cell.z) & kCellOccupied) != 0;
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {
@@ -128,11 +132,11 @@ private:
         void empty(ivec3 cell, bool inside) { builder.set_empty(cell, inside, task, result); }
         bool keeps(ivec3 cell, Inserted inserted, sdf::ListCuller::Start start) const {
             if (whole()) return false;
+            if (inserted == Inserted::NoEffect &&
+                std::none_of(gone.begin(), gone.end(), [&](const CellBox& b) { return contains(b, cell); }))
+                return true;
             const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
-            if ((word & kCellOccupied) == 0)
-                return inserted == Inserted::NoEffect &&
-                       std::none_of(gone.begin(), gone.end(), [&](const CellBox& b) { return contains(b, cell); });
-            return inserted != Inserted::Shows &&
+            return (word & kCellOccupied) != 0 && inserted != Inserted::Shows &&
                    stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);
         }
         void brick(ivec3 cell, CellMaker& maker) {
@@ -144,9 +148,8 @@ private:
         }
     };
 
-    CellMaker maker() const {
-        return {*program_, {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}, inserted_};
-    }
+    CellLattice lattice() const { return {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}; }
+    CellMaker maker() const { return {*program_, lattice(), inserted_}; }
     static void count(const CellMaker& maker, TaskResult& result) {
         result.cells_tested += maker.cells_tested();
         result.cells_evaluated += maker.cells_evaluated();
@@ -202,19 +205,23 @@ private:
     ivec3 first_cell() const { return {out_->grid_.cell_x, out_->grid_.cell_y, out_->grid_.cell_z}; }
 
     void find_dirty() {
-        const auto add = [&](uint32_t row) {
-            const CellBox world = cells_reached(*program_, row, options_.voxel_size);
-            const CellBox box = grown({world.min - first_cell(), world.max - first_cell()}, 0, size_);
+        const auto on_grid = [&](const CellBox& world) {
+            return grown({world.min - first_cell(), world.max - first_cell()}, 0, size_);
+        };
+        const auto add = [&](uint32_t row, bool gone) {
+            const CellsReached world = cells_reached(*program_, row, lattice(), gone);
+            const CellBox box = on_grid(world.stored), owned = on_grid(world.owned);
             if (!box.empty()) dirty_.push_back(box);
+            if (!owned.empty()) owned_.push_back(owned);
             return box;
         };
         for (const RowChange& change : changes_) {
             if (change.removed != kNoRow) {
-                was_reached_.push_back(add(change.removed));
+                was_reached_.push_back(add(change.removed, true));
                 removed_.push_back(change.removed);
             }
             if (change.inserted != kNoRow) {
-                (void)add(change.inserted);
+                (void)add(change.inserted, false);
                 inserted_.push_back(change.inserted);
             }
         }
@@ -281,6 +288,7 @@ private:
             result.empties.push_back({cell, inside});
     }
 
+    // Of the first changed edit that reaches it.
     void occupancy_changed(ivec3 cell) {
         for (size_t i = 0; i < dirty_.size(); ++i) {
             if (!contains(dirty_[i], cell)) continue;
@@ -342,7 +350,7 @@ private:
                 record.code_count = leaf.code_count;
                 if (!had) {
                     out_->cells_.set(leaf.cell.x, leaf.cell.y, leaf.cell.z, kCellOccupied | slot);
-                    occupancy_changed(leaf.cell);
+                    if (old_ != nullptr) came_.push_back(leaf.cell);
                 }
                 out_->jobs_.push_back(slot);
                 if (made_ != nullptr) made_->emplace_back(slot, std::move(leaf.content));
@@ -391,8 +399,29 @@ private:
             update_jumps(out_->cells_, {{0, 0, 0}, size_});
             return;
         }
-        for (const CellBox& box : occupancy_changes_) {
-            if (!box.empty()) update_jumps(out_->cells_, grown(box, kMaxJump - 1, size_));
+        if (out_->stats_.bricks_freed == 0) {
+            lower_jumps(out_->cells_, came_);
+            return;
+        }
+        for (const ivec3 cell : came_) occupancy_changed(cell);
+        // One box for several where that is less to look at, as where an edit moved a little.
+        std::vector<CellBox>& boxes = occupancy_changes_;
+        for (CellBox& box : boxes) {
+            if (!box.empty()) box = grown(box, kMaxJump - 1, size_);
+        }
+        const auto looked_at = [](const CellBox& box) {
+            constexpr int kAround = 2 * (kMaxJump - 1);
+            const ivec3 s = box.max - box.min + ivec3{kAround, kAround, kAround};
+            return int64_t(s.x) * s.y * s.z;
+        };
+        for (size_t i = 0; i < boxes.size(); ++i) {
+            for (size_t j = i + 1; j < boxes.size() && !boxes[i].empty(); ++j) {
+                const CellBox both = joined(boxes[i], boxes[j]);
+                if (boxes[j].empty() || looked_at(both) > looked_at(boxes[i]) + looked_at(boxes[j])) continue;
+                boxes[j] = both;
+                boxes[i] = {};
+            }
+            if (!boxes[i].empty()) update_jumps(out_->cells_, boxes[i]);
         }
     }
 
@@ -403,7 +432,10 @@ private:
     std::span<const RowChange> changes_;
     MadeBricks* made_;
     ivec3 size_;
-    std::vector<CellBox> dirty_, was_reached_, occupancy_changes_;
+    std::vector<CellBox> dirty_, was_reached_;
+    std::vector<CellBox> owned_;              // where cells may come to own a brick
+    std::vector<CellBox> occupancy_changes_;  // by changed edit
+    std::vector<ivec3> came_;                 // cells that own a brick now
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;
     std::vector<TaskResult> results_;

@@ -7,6 +7,7 @@
 #include "field/brick.gpu.h"
 
 #include <cstdint>
+#include <span>
 
 namespace kiln::field {
 
@@ -71,5 +72,8 @@ private:
 /// two voxels: so they all have one sign. Writes only words that differ. On a torus distance wraps too: a jump may be shorter than it
 /// could be, never longer. A cell that becomes occupied or empty changes jumps up to kMaxJump - 1 cells away.
 void update_jumps(CellMap& cells, const CellBox& box);
+
+/// The same after these cells, and no others, became occupied: looks only where a jump may be another. Not on a torus.
+void lower_jumps(CellMap& cells, std::span<const ivec3> occupied);
 
 }  // namespace kiln::field

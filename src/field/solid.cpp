@@ -44,27 +44,24 @@ std::array<Slice, 8> solid_texels(const std::byte* codes, int texel_bytes) {
 
 SolidVoxels solid_voxels(const std::array<Slice, 8>& texels) {
     SolidVoxels out;
-    std::array<Slice, 7> voxels;
     Slice all = 0;
-    int first_z = 7, last_z = 0;
+    uint32_t slices = 0;  // bit z: some voxel is solid
     for (size_t z = 0; z < 7; ++z) {
         Slice any = texels[z] | texels[z + 1];
         any |= any >> 8;
         any |= any >> 1;
-        voxels[z] = any & 0x007f7f7f7f7f7f7fu;
-        all |= voxels[z];
-        if (voxels[z] == 0) continue;
-        first_z = first_z == 7 ? int(z) : first_z;
-        last_z = int(z);
+        any &= 0x007f7f7f7f7f7f7fu;
+        std::memcpy(out.rows.data() + sizeof any * z, &any, sizeof any);
+        slices |= uint32_t(any != 0) << z;
+        all |= any;
     }
     if (all == 0) return out;
-    std::memcpy(out.rows.data(), voxels.data(), sizeof voxels);
     const int first_y = std::countr_zero(all) / 8, last_y = 7 - std::countl_zero(all) / 8;
     Slice columns = all | all >> 32;
     columns |= columns >> 16;
     columns = (columns | columns >> 8) & 0x7f;
-    out.box =
-        solid_box({std::countr_zero(columns), first_y, first_z}, {63 - std::countl_zero(columns), last_y, last_z});
+    out.box = solid_box({std::countr_zero(columns), first_y, std::countr_zero(slices)},
+                        {63 - std::countl_zero(columns), last_y, 31 - std::countl_zero(slices)});
     return out;
 }
 

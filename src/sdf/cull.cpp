@@ -49,43 +49,37 @@ ListCuller::List ListCuller::list_of(std::span<const uint32_t> rows) {
 
 void ListCuller::fold(Fold& fold) {
     const size_t n = fold.list.count;
-    fold_entries_.clear();
-    const float far = fold.balls.far;
-    if (std::isfinite(far)) {
-        BlendAllowance allowance;
-        for (const Entry& entry : std::span(entries_).subspan(fold.list.first, n))
-            allowance.add(program_->edits[entry.row].reach);
-        fold.balls.far += allowance.metres();
-    }
-    for (const Entry& entry : std::span(entries_).subspan(fold.list.first, n)) {
+    const std::span<const Entry> entries = std::span(entries_).subspan(fold.list.first, n);
+    const bool has_far = std::isfinite(fold.balls.far);
+    fold_entries_.resize(n);
+    BlendAllowance later;  // of what comes after an entry
+    for (size_t i = n; i-- > 0;) {
+        const Entry& entry = entries[i];
         const EditSpan& span = program_->edits[entry.row];
         const std::span<const Instruction> code = code_of(entry);
-        FoldEntry f{reinterpret_cast<const uint32_t*>(code.data()),
-                    uint32_t(code.size()),
-                    span.blend,
-                    span.reach,
-                    uint8_t(span.op),
-                    entry.join,
-                    {0, 0, 0},
-                    {kInfinite, kInfinite, kInfinite}};
-        if (std::isfinite(fold.balls.far) && !span.everywhere()) {
-            const Box3 box = span.indexed(entry.row).influence(fold.balls.far);
+        FoldEntry& f = fold_entries_[i];
+        f = {reinterpret_cast<const uint32_t*>(code.data()),
+             uint32_t(code.size()),
+             span.blend,
+             span.reach,
+             fold.balls.far + later.metres(),
+             uint8_t(span.op),
+             entry.join,
+             {0, 0, 0},
+             {kInfinite, kInfinite, kInfinite}};
+        if (has_far && !span.everywhere()) {
+            const Box3 box = span.indexed(entry.row).influence(f.far);
             const vec3 middle = box.center(), half = box.half_extents();
-            f = {f.code,
-                 f.code_count,
-                 f.blend,
-                 f.reach,
-                 f.op,
-                 f.join,
-                 {middle.x, middle.y, middle.z},
-                 {half.x, half.y, half.z}};
+            for (size_t axis = 0; axis < 3; ++axis) {
+                f.middle[axis] = axis == 0 ? middle.x : axis == 1 ? middle.y : middle.z;
+                f.half[axis] = axis == 0 ? half.x : axis == 1 ? half.y : half.z;
+            }
         }
-        fold_entries_.push_back(f);
+        later.add(span.reach);
     }
     fold.left.resize(n);
     fold.right.resize(n);
     fold_list(fold_entries_, numbers_, fold.balls, fold.left.data(), fold.right.data(), fold.value);
-    fold.balls.far = far;
 }
 
 // From the last edit to the first, as prune() walks its tape: a ball needs what comes before as a value, for its material, or not.

@@ -174,11 +174,15 @@ void EditIndex::find(const Box3& box, float value, float per_reach, std::vector<
         box, value, per_reach, [](const Node&) { return true; }, [&](const IndexedEdit& e) { rows.push_back(e.row); });
 }
 
-// A world is a left fold. With T the value above which a result need not be known, an operand of a smooth operation with radius k must
-// be known up to T + 5k/4: the result lies at most k/4 below the smaller operand, and one that is k above the other changes nothing. Going
-// backwards over a list these add up, which bounds how far any operand can matter. But each step that a value takes down such a ladder
-// of operands, s < k apart, hands on at most (1 - s/k)/2 of it: over a height of H that is less than exp(-2.68 H/k), so six of the largest
-// radii are always enough (1e-7 of k).
+// A world is a left fold. Say that a result need not be known where it is above T (below -T: likewise, upside down). Then an operand of an
+// operation with reach k, and what came before it, need not be known where they are above T + k + S, S being the reaches that come later.
+// Proof, backwards: let two states of the running value, at a point, both be above T + S'. If the next edit is a union (reach k, S' = k + S)
+// that lies k below both, it alone decides, and they are one. Else the edit lies above T + S, and each of them k above that, so
+// smin(T + S + k, T + S) = T + S bounds what comes of each from below. Cuts only raise them. In the end both are above T, or they are one.
+// Now take an operand away that is above T + k + S: the running value is as it was, or was less than k below the operand, and before
+// and after both are above T + S.
+// But each step that a value takes down such a ladder of operands, s < k apart, hands on at most (1 - s/k)/2 of it: over a height of H that
+// is less than exp(-2.68 H/k), so six of the largest reaches are always enough (1e-7 of k).
 float EditIndex::blend_allowance(const Box3& box, float value, uint32_t without) const {
     BlendAllowance out;
     each(

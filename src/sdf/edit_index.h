@@ -32,7 +32,7 @@ struct IndexedEdit {
 class BlendAllowance {
 public:
     void add(float reach) {
-        sum_ += 1.25f * reach;
+        sum_ += reach;
         largest_ = std::max(largest_, reach);
     }
     float metres() const { return std::min(sum_, kLadder * largest_); }

@@ -64,9 +64,10 @@ struct FoldEntry {
     const uint32_t* code;
     uint32_t code_count;
     float blend, reach;  ///< of its Combine, metres
+    float far;           ///< Balls::far, and what later entries can lead down to it: see EditIndex::blend_allowance
     uint8_t op;
     Join join;                 ///< Combine, or what pruning for a larger ball has made of it (program.h)
-    float middle[3], half[3];  ///< box outside of which its value is above Balls::far + reach; half may be infinite
+    float middle[3], half[3];  ///< box outside of which its value is above far + reach; half may be infinite
 };
 
 /// Centres of up to 64 balls of one radius; those without a bit in `live` are computed but mean nothing.

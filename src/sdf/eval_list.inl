@@ -39,7 +39,7 @@ void fold_list(const FoldEntry* entries, size_t count, const float* params, cons
             continue;
         }
         const real slack = real(param(2.0f * balls.radius + e.reach));
-        const real limit = real(param(balls.far + balls.radius + e.reach));
+        const real limit = real(param(e.far + balls.radius + e.reach));
         mask wins_left[KILN_VECTORS], wins_right[KILN_VECTORS];
         for (int i = 0; i < KILN_VECTORS; ++i) {
             const real a = running.v[i], b = other.v[i];
@@ -224,15 +224,17 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
         }
         pc = end;
     }
-    real nearest = abs(values.v[0][0]);
+    // Four at a time: a minimum waits for the one before it.
+    real nearest[4];
+    for (int i = 0; i < 4; ++i) nearest[i] = abs(values.v[0][0]);
     for (int slice = 0; slice < kBrickSlices; ++slice) {
         for (int i = 0; i < kSliceVectors; ++i) {
-            nearest = min(nearest, abs(values.v[slice][i]));
+            nearest[i & 3] = min(nearest[i & 3], abs(values.v[slice][i]));
             store(out + (slice * kSliceVectors + i) * kLanes, values.v[slice][i]);
         }
     }
     float lanes[kLanes];
-    store(lanes, nearest);
+    store(lanes, min(min(nearest[0], nearest[1]), min(nearest[2], nearest[3])));
     float least = lanes[0];
     for (int i = 1; i < kLanes; ++i) least = lanes[i] < least ? lanes[i] : least;
     return least;
@@ -263,14 +265,18 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
         return (bits + 0x0fffu + ((bits >> 13) & 1u)) >> 13;
     };
     const auto at_limit = rounded(real(param(limit))), at_least = rounded(real(param(least)));
-    for (size_t i = 0; i < count; i += kLanes) {
-        const real v = load(values + i) * param(scale);
-        if (i % 64 == 0) solid[i / 64] = 0;
-        solid[i / 64] |= uint64_t(lane_bits(le(v, zero))) << (i % 64);
-        const real size = abs(v);
-        auto code = choose(lt(size, real(param(limit))), rounded(size), at_limit);  // NaN is not below it
-        code = choose(lt(size, real(param(least))), at_least, code);
-        code = choose(le(size, zero), all_words(0), code) | choose(lt(v, zero), all_words(0x8000u), all_words(0));
-        store_words(codes + i, code);
+    for (size_t slice = 0; slice < count / 64; ++slice) {
+        uint64_t bits = 0;  // kept apart from memory: each vector's are joined to those before
+        for (size_t at = 0; at < 64; at += kLanes) {
+            const size_t i = 64 * slice + at;
+            const real v = load(values + i) * param(scale);
+            bits |= uint64_t(lane_bits(le(v, zero))) << at;
+            const real size = abs(v);
+            auto code = choose(lt(size, real(param(limit))), rounded(size), at_limit);  // NaN is not below it
+            code = choose(lt(size, real(param(least))), at_least, code);
+            code = choose(le(size, zero), all_words(0), code) | choose(lt(v, zero), all_words(0x8000u), all_words(0));
+            store_words(codes + i, code);
+        }
+        solid[slice] = bits;
     }
 }

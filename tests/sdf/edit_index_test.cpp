@@ -103,10 +103,10 @@ TEST(EditIndex, TheAllowanceIsForBlendsThatAreNearAndNoMoreThanSixRadii) {
     const Box3 here{{-1, -1, -1}, {1, 1, 1}};
     EXPECT_EQ(index.blend_allowance(here, 0.5f), 0.0f);
     index.insert(edit(1, 2, 0.4f));
-    EXPECT_FLOAT_EQ(index.blend_allowance(here, 0.5f), 0.5f);
+    EXPECT_FLOAT_EQ(index.blend_allowance(here, 0.5f), 0.4f);
     EXPECT_EQ(index.blend_allowance(here, 0.5f, 1), 0.0f);
     index.insert(edit(2, 100, 3));
-    EXPECT_FLOAT_EQ(index.blend_allowance(here, 0.5f), 0.5f) << "far away";
+    EXPECT_FLOAT_EQ(index.blend_allowance(here, 0.5f), 0.4f) << "far away";
     for (uint32_t i = 3; i < 20; ++i) index.insert(edit(i, 1, 0.4f));
     EXPECT_FLOAT_EQ(index.blend_allowance(here, 0.5f), 2.4f);
 }
