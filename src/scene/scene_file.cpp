@@ -10,6 +10,7 @@
 #include "base/format.h"
 #include "field/level_cells.gpu.h"
 #include "model/triangles.h"
+#include "physics/physics.h"
 
 #include <bit>
 #include <cmath>
@@ -246,6 +247,11 @@ private:
         if (!ids("meshes", meshes) || !ids("bodies", bodies) || !ids("triggers", triggers) ||
             !ids("characters", characters) || !ids("cloths", cloths) || !ids("fluids", fluids))
             return false;
+        // The ground is a body too.
+        if (const size_t count = bodies.size() + characters.size(); count >= physics::World::kMostBodies)
+            return in_.fail(*section(bodies.empty() ? "characters" : "bodies"),
+                            formatted("{} bodies and characters; there is room for {}, leave some out", count,
+                                      physics::World::kMostBodies - 1));
         const auto known = [](const auto& map) {
             std::vector<std::string_view> names;
             for (const auto& [name, n] : map) names.push_back(name);

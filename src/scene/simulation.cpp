@@ -33,13 +33,6 @@ std::string command_in(const std::string& line) {
 Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const SimulateSettings& settings) {
     std::unique_ptr<Simulation> out(new Simulation(start));
     const SceneData& data = start.impl_->data;
-    // The ground is one too.
-    if (const size_t count = data.bodies.size() + data.characters.size(); count >= physics::World::kMostBodies) {
-        const std::string what = formatted("{} bodies and characters; there is room for {}, leave some out", count,
-                                           physics::World::kMostBodies - 1);
-        return out->fault(data.bodies.empty() ? data.characters.front().place : data.bodies.front().place, "bodies",
-                          what);
-    }
     const int threads = settings.threads > 0 ? settings.threads : std::max(1, int(std::thread::hardware_concurrency()));
     auto world = physics::make_world(settings.backend, {.gravity = data.physics.gravity, .threads = threads});
     if (!world) return world.error();
