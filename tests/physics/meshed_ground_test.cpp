@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Ground that is meshed by regions where it has settled, beside the field that it is meshed from.
 #include "field/mesh_facts.h"
-#include "physics/character.h"
 #include "physics/physics.h"
 #include "physics/worlds.h"
 
@@ -10,6 +9,7 @@
 
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <random>
 
 using namespace kiln;

@@ -9,6 +9,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -175,6 +177,19 @@ TEST(MeshMass, IsTheFormulasOfBoxAndOctahedronWhereverTheyAre) {
     EXPECT_NEAR(eight->mass, 4.0 / 3 * 6, 1e-5);
     EXPECT_NEAR(eight->moments.x, eight->mass / 10 * (4 + 9), 1e-4);
     EXPECT_NEAR(eight->moments.z, eight->mass / 10 * (1 + 4), 1e-4);
+    // A corner of a cube: its centre is not its box's, and its axes are not the frame's.
+    Triangles corner;
+    corner.vertices = {{2, 1, 3}, {3, 1, 3}, {2, 2, 3}, {2, 1, 4}};
+    corner.indices = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+    const auto four = mass_of_mesh(corner);
+    ASSERT_TRUE(four) << four.error().message;
+    EXPECT_NEAR(four->mass, 1.0 / 6, 1e-9);
+    EXPECT_LT(length(four->center - vec3{2.25f, 1.25f, 3.25f}), 1e-6f);
+    std::array<double, 3> moments{four->moments.x, four->moments.y, four->moments.z};
+    std::sort(moments.begin(), moments.end());
+    EXPECT_NEAR(moments[0], 1.0 / 96, 1e-9);
+    EXPECT_NEAR(moments[1], 1.0 / 96, 1e-9);
+    EXPECT_NEAR(moments[2], 1.0 / 60, 1e-9);
 }
 
 TEST_P(OnTriangles, AMeshThatMovesFallsRollsAndRestsOnFieldsAndTrianglesAndOthers) {

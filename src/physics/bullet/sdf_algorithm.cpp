@@ -64,14 +64,19 @@ public:
 protected:
     // Contacts found when the bodies lay as they still do, within half a millimetre and a sixth of a degree, are good for another step;
     // Bullet moves their points along. (Jolt does so too.)
-    bool as_before(const Pose& second_from_first, uint32_t revision, btManifoldResult* result) {
+    // `more`: another manifold of the pair, or null.
+    bool as_before(const Pose& second_from_first, uint32_t revision, btManifoldResult* result,
+                   btPersistentManifold* more = nullptr) {
         constexpr float kPlace = 5e-4f, kTurn = 3e-3f;
         const quat turn = conjugate(found_at_.rotation) * second_from_first.rotation;
         const float way = length(second_from_first.position - found_at_.position);
-        if (manifold_->getNumContacts() > 0 && revision == revision_ && way < kPlace &&
-            2 * std::hypot(turn.x, turn.y, turn.z) < kTurn) {
-            result->setPersistentManifold(manifold_);
-            result->refreshContactPoints();
+        const int known = manifold_->getNumContacts() + (more != nullptr ? more->getNumContacts() : 0);
+        if (known > 0 && revision == revision_ && way < kPlace && 2 * std::hypot(turn.x, turn.y, turn.z) < kTurn) {
+            for (btPersistentManifold* m : {manifold_, more}) {
+                if (m == nullptr) continue;
+                result->setPersistentManifold(m);
+                result->refreshContactPoints();
+            }
             return true;
         }
         found_at_ = second_from_first;
@@ -144,6 +149,9 @@ public:
             add(result, world_from_field, kFieldFirst);
             return;
         }
+        btManifoldArray met;
+        if (on_triangles_ != nullptr) on_triangles_->getAllContactManifolds(met);
+        if (as_before(field_from_convex, shape.revision(), result, met.size() > 0 ? met[0] : nullptr)) return;
         const bool triangles =
             collide_ground(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
         if (contacts_.empty()) {
