@@ -86,7 +86,6 @@ public:
             }
         }
         if (auto ok = merge(); !ok) return ok.error();
-        finish_jumps();
         out_->revision_ = ++revisions;
         out_->parent_revision_ = old_ != nullptr ? old_->revision_ : 0;
         return std::shared_ptr<const Field>(std::move(out_));
@@ -227,7 +226,6 @@ private:
         }
         std::sort(removed_.begin(), removed_.end());
         std::sort(inserted_.begin(), inserted_.end());
-        occupancy_changes_.resize(dirty_.size(), CellBox{});
     }
 
     bool is_dirty(const CellBox& box) const {
@@ -288,15 +286,6 @@ private:
             result.empties.push_back({cell, inside});
     }
 
-    // Of the first changed edit that reaches it.
-    void occupancy_changed(ivec3 cell) {
-        for (size_t i = 0; i < dirty_.size(); ++i) {
-            if (!contains(dirty_[i], cell)) continue;
-            occupancy_changes_[i] = joined(occupancy_changes_[i], {cell, cell + ivec3{1, 1, 1}});
-            return;
-        }
-    }
-
     // Takes and gives slots in the order of tasks and cells, writes words, records and code.
     Result<void> merge() {
         BrickPool& pool = out_->pool_;
@@ -313,6 +302,7 @@ private:
         }
         out_->jobs_.reserve(leaves);
         if (made_ != nullptr) made_->reserve(leaves);
+        std::vector<ivec3> went, came;  // of an update: cells that own no brick any more, and that now do
         for (const TaskResult& result : results_) {
             for (const Leaf& leaf : result.leaves) {
                 if (leaf.code_count != 0) continue;
@@ -321,16 +311,17 @@ private:
                 pool.release(slot);
                 out_->records_.write(slot) = {};
                 ++out_->stats_.bricks_freed;
-                occupancy_changed(leaf.cell);
+                went.push_back(leaf.cell);
             }
             for (const Emptied& empty : result.empties) {
                 const uint32_t word = out_->cells_.at(empty.cell.x, empty.cell.y, empty.cell.z);
-                // The old jump may stay: update_jumps() rewrites every one that could differ.
+                // The old jump may stay: what could differ is rewritten.
                 out_->cells_.set(
                     empty.cell.x, empty.cell.y, empty.cell.z,
                     (empty.inside ? kCellInside : 0u) | ((word & kCellOccupied) != 0 ? uint32_t(kMaxJump) : word & 7u));
             }
         }
+        raise_jumps(out_->cells_, went);
         const GridParams& g = out_->grid_;
         for (TaskResult& result : results_) {
             const uint32_t base = uint32_t(out_->code_.append(result.code));
@@ -350,7 +341,7 @@ private:
                 record.code_count = leaf.code_count;
                 if (!had) {
                     out_->cells_.set(leaf.cell.x, leaf.cell.y, leaf.cell.z, kCellOccupied | slot);
-                    if (old_ != nullptr) came_.push_back(leaf.cell);
+                    if (old_ != nullptr) came.push_back(leaf.cell);
                 }
                 out_->jobs_.push_back(slot);
                 if (made_ != nullptr) made_->emplace_back(slot, std::move(leaf.content));
@@ -360,6 +351,11 @@ private:
             return Error{"field: " + std::to_string(uint64_t(pool.in_use()) + pool.refused()) +
                              " bricks needed, the pool holds " + std::to_string(options_.max_bricks),
                          ErrorKind::OutOfMemory};
+        }
+        if (old_ == nullptr) {
+            update_jumps(out_->cells_, {{0, 0, 0}, size_});
+        } else {
+            lower_jumps(out_->cells_, came);
         }
         out_->stats_.bricks = pool.in_use();
         out_->stats_.bricks_baked = uint32_t(out_->jobs_.size());
@@ -394,37 +390,6 @@ private:
         out_->code_ = std::move(packed);
     }
 
-    void finish_jumps() {
-        if (old_ == nullptr) {
-            update_jumps(out_->cells_, {{0, 0, 0}, size_});
-            return;
-        }
-        if (out_->stats_.bricks_freed == 0) {
-            lower_jumps(out_->cells_, came_);
-            return;
-        }
-        for (const ivec3 cell : came_) occupancy_changed(cell);
-        // One box for several where that is less to look at, as where an edit moved a little.
-        std::vector<CellBox>& boxes = occupancy_changes_;
-        for (CellBox& box : boxes) {
-            if (!box.empty()) box = grown(box, kMaxJump - 1, size_);
-        }
-        const auto looked_at = [](const CellBox& box) {
-            constexpr int kAround = 2 * (kMaxJump - 1);
-            const ivec3 s = box.max - box.min + ivec3{kAround, kAround, kAround};
-            return int64_t(s.x) * s.y * s.z;
-        };
-        for (size_t i = 0; i < boxes.size(); ++i) {
-            for (size_t j = i + 1; j < boxes.size() && !boxes[i].empty(); ++j) {
-                const CellBox both = joined(boxes[i], boxes[j]);
-                if (boxes[j].empty() || looked_at(both) > looked_at(boxes[i]) + looked_at(boxes[j])) continue;
-                boxes[j] = both;
-                boxes[i] = {};
-            }
-            if (!boxes[i].empty()) update_jumps(out_->cells_, boxes[i]);
-        }
-    }
-
     const Field* old_;
     std::shared_ptr<const sdf::Program> program_;
     FieldOptions options_;
@@ -433,9 +398,7 @@ private:
     MadeBricks* made_;
     ivec3 size_;
     std::vector<CellBox> dirty_, was_reached_;
-    std::vector<CellBox> owned_;              // where cells may come to own a brick
-    std::vector<CellBox> occupancy_changes_;  // by changed edit
-    std::vector<ivec3> came_;                 // cells that own a brick now
+    std::vector<CellBox> owned_;  // where cells may come to own a brick
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;
     std::vector<TaskResult> results_;

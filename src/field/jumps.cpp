@@ -216,47 +216,68 @@ void update_jumps(CellMap& cells, const CellBox& box) {
     });
 }
 
-// Jumps differ by at most one between neighbours. So a cell that gets a new jump k lies beside one that gets k - 1, and so on down to a new
-// brick: the wave of those that change starts there and is followed no further than it reaches, which in a crowd is a cell or two.
-void lower_jumps(CellMap& cells, std::span<const ivec3> occupied) {
+// Jumps differ by at most one between neighbours. So a cell whose jump becomes k because of a new brick lies beside one whose jump becomes
+// k - 1, and so on down to that brick; and where a jump was k because of a brick that is gone, the same holds of what was. Either way the
+// wave of cells that change starts there, and is followed no further than it reaches, which in a crowd is a cell or two.
+// Asks changes(cell, k) of the cells k steps from `from`, of those that lie beside one that it said yes of, or of `from`.
+template <typename Fn>
+static void follow(ivec3 size_of_grid, std::span<const ivec3> from, Fn&& changes) {
     CellBox all{};
-    for (const ivec3 c : occupied) all = joined(all, {c, c + ivec3{1, 1, 1}});
+    for (const ivec3 c : from) all = joined(all, {c, c + ivec3{1, 1, 1}});
     if (all.empty()) return;
-    CellBox box = grown(all, kReach, cells.size());
+    CellBox box = grown(all, kReach, size_of_grid);
     box.min.x &= ~(kCellPage - 1);
     const ivec3 size = box.max - box.min;
     BitBox front(size), near(size), by_x(size), by_y(size), seen(size);
-    for (const ivec3 c : occupied) {
+    for (const ivec3 c : from) {
         const ivec3 at = c - box.min;
         const uint64_t bit = uint64_t(1) << (at.x % 64);
         front.row(at.y, at.z)[at.x / 64] |= bit;
         seen.row(at.y, at.z)[at.x / 64] |= bit;
     }
-    for (uint32_t k = 1; k <= uint32_t(kReach); ++k) {
+    bool any = true;
+    for (uint32_t k = 1; k <= uint32_t(kReach) && any; ++k) {
         const CellBox wave = grown({all.min - box.min, all.max - box.min}, int(k), size);
         dilate(front, by_x, by_y, near, {wave.min.y, wave.max.y, wave.min.z, wave.max.z});
-        bool any = false;
+        any = false;
         for (int z = wave.min.z; z < wave.max.z; ++z) {
             for (int y = wave.min.y; y < wave.max.y; ++y) {
                 for (size_t w = 0; w < near.row_words; ++w) {
-                    uint64_t asked = near.row(y, z)[w] & ~seen.row(y, z)[w], changed = 0;
+                    uint64_t asked = near.row(y, z)[w] & ~seen.row(y, z)[w], yes = 0;
                     seen.row(y, z)[w] |= asked;
                     for (; asked != 0; asked &= asked - 1) {
                         const int bit = std::countr_zero(asked);
-                        const ivec3 at = box.min + ivec3{int(w) * 64 + bit, y, z};
-                        if (at.x >= box.max.x) break;
-                        const uint32_t word = cells.at(at.x, at.y, at.z);
-                        if ((word & kCellOccupied) != 0 || (word & uint32_t(kMaxJump)) <= k) continue;
-                        cells.set(at.x, at.y, at.z, (word & kCellInside) | k);
-                        changed |= uint64_t(1) << bit;
+                        const ivec3 cell = box.min + ivec3{int(w) * 64 + bit, y, z};
+                        if (cell.x >= box.max.x) break;
+                        if (changes(cell, k)) yes |= uint64_t(1) << bit;
                     }
-                    front.row(y, z)[w] = changed;
-                    any = any || changed != 0;
+                    front.row(y, z)[w] = yes;
+                    any = any || yes != 0;
                 }
             }
         }
-        if (!any) return;
     }
+}
+
+void lower_jumps(CellMap& cells, std::span<const ivec3> occupied) {
+    follow(cells.size(), occupied, [&](ivec3 c, uint32_t k) {
+        const uint32_t word = cells.at(c.x, c.y, c.z);
+        if ((word & kCellOccupied) != 0 || (word & uint32_t(kMaxJump)) <= k) return false;
+        cells.set(c.x, c.y, c.z, (word & kCellInside) | k);
+        return true;
+    });
+}
+
+void raise_jumps(CellMap& cells, std::span<const ivec3> emptied) {
+    CellBox changed{};
+    for (const ivec3 c : emptied) changed = joined(changed, {c, c + ivec3{1, 1, 1}});
+    follow(cells.size(), emptied, [&](ivec3 c, uint32_t k) {
+        const uint32_t word = cells.at(c.x, c.y, c.z);
+        if ((word & kCellOccupied) != 0 || (word & uint32_t(kMaxJump)) != k) return false;
+        changed = joined(changed, {c, c + ivec3{1, 1, 1}});
+        return true;
+    });
+    update_jumps(cells, changed);
 }
 
 }  // namespace kiln::field

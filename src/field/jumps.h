@@ -73,7 +73,8 @@ private:
 /// could be, never longer. A cell that becomes occupied or empty changes jumps up to kMaxJump - 1 cells away.
 void update_jumps(CellMap& cells, const CellBox& box);
 
-/// The same after these cells, and no others, became occupied: looks only where a jump may be another. Not on a torus.
+/// The same after these cells, and no others, became occupied, or empty with any jump: look only where a jump may be another. Not on a torus.
 void lower_jumps(CellMap& cells, std::span<const ivec3> occupied);
+void raise_jumps(CellMap& cells, std::span<const ivec3> emptied);
 
 }  // namespace kiln::field

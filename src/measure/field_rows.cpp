@@ -319,6 +319,9 @@ private:
             out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
             run_.add_checked(out, turns.checksum, rebuilt(after(bites)));
         }
+        for (const auto& [name, count] : kAmong) {
+            if (wanted(name)) among(name, count, threads);
+        }
         struct Way {
             const char* name;
             Change change;
@@ -355,6 +358,46 @@ private:
             out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
             run_.add_checked(out, turns.checksum, rebuilt(after(steps)));
         }
+    }
+
+    // What an edit costs among so many others that lie as close together as the scene's do: the scene's recipe in a larger box, of which the
+    // grid covers the middle, kAmongHalf to each side.
+    struct Among {
+        const char* name;
+        uint32_t count;
+    };
+    static constexpr Among kAmong[] = {
+        {"edit.among.10k", 10000}, {"edit.among.100k", 100000}, {"edit.among.1m", 1000000}};
+    static constexpr float kAmongHalf = 2;
+
+    void among(const char* name, uint32_t count, int threads) {
+        run_.stage(name);
+        std::vector<Edit> edits = recipe(kind_, run_.options.seed, count);
+        const float wider = std::cbrt(float(count) / 1000);
+        for (Edit& e : edits) e.node.transform.position = e.node.transform.position * wider;
+        field::FieldOptions options;
+        options.voxel_size = float(voxel());
+        options.bounds = {{-kAmongHalf, -kAmongHalf, -kAmongHalf}, {kAmongHalf, kAmongHalf, kAmongHalf}};
+        options.workers = threads;
+        std::vector<Step> steps;
+        for (uint32_t m = 0; m < kEdits; ++m) steps.push_back({count + m, std::nullopt, bite(m)});
+        Turns out;
+        {
+            const std::shared_ptr<const sdf::Program> program = program_of(edits);
+            State state{*program, *HostBricks::build(program, options), {}};
+            for (uint32_t i = 0; i < count; ++i) state.rows.push_back(i);
+            // One world throughout, as a program has it: a copy's first edit would pay for the copy.
+            for (int turn = 0; turn < run_.options.runs; ++turn) {
+                for (uint32_t m = 0; m < kEdits; ++m)
+                    out.forwards[m] = std::min(out.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
+                if (turn == 0) out.checksum = stored(state.bricks).checksum;
+                for (uint32_t m = kEdits; m-- > 0;) apply(state, steps[m].back());
+            }
+        }
+        for (const Step& step : steps) edits.push_back(*step.after);
+        BenchRow made = row(name, mean(out.forwards) * 1e6, "µs", threads);
+        made.count = count;
+        run_.add_checked(made, out.checksum, stored(*HostBricks::build(program_of(edits), options)).checksum);
     }
 
     uint64_t rebuilt(std::span<const Edit> edits) const {
@@ -635,9 +678,10 @@ private:
 BenchFamily field_family() {
     return {{"field",
              "the field of 1000 spheres and boxes: building, editing, sampling, rays, meshes, memory",
-             {"bake", "edit.mean", "edit.worst", "undo", "edit.cold", "edit.add", "edit.smooth", "edit.move",
-              "edit.remove", "samples.random", "samples.band", "query.single", "rays", "rays.refined", "mesh.smooth",
-              "mesh.sharp", "memory.per_voxel"}},
+             {"bake",           "edit.mean",       "edit.worst",   "undo",           "edit.cold",       "edit.add",
+              "edit.smooth",    "edit.move",       "edit.remove",  "edit.among.10k", "edit.among.100k", "edit.among.1m",
+              "samples.random", "samples.band",    "query.single", "rays",           "rays.refined",    "mesh.smooth",
+              "mesh.sharp",     "memory.per_voxel"}},
             [](BenchRun& run) {
                 for (const int kind : run.options.kinds)
                     if (!run.fault()) FieldRows(run, kind).all();

@@ -324,6 +324,51 @@ TEST(Field, IncrementalIsFullAfterRandomEdits) {
     }
 }
 
+// Many small ones, which blend or do not, before, between and after each other: what a change leads on to later ones.
+TEST(Field, IncrementalIsFullInACrowdThatBlends) {
+    worlds::Random r(41);
+    worlds::World world{"crowd", {}, {.voxel_size = 0.03f, .bounds = {{-0.9f, -0.9f, -0.9f}, {0.9f, 0.9f, 0.9f}}}};
+    const auto one = [&] {
+        const Op ops[] = {Op::Union, Op::Union, Op::Union, Op::Subtract, Op::Paint};
+        Edit e = worlds::edit(Sphere{.radius = r.in(0.03f, 0.12f)}, r.point(0.8f), ops[r.below(5)],
+                              r.below(2) == 0 ? r.in(0, 0.15f) : 0.0f);
+        if (r.below(2) == 0) e.node.shape = Box{.half_extents = {0.1f, r.in(0.01f, 0.1f), 0.05f}};
+        if (r.below(3) == 0) e.material_blend_radius = r.in(0, 0.1f);
+        if (e.op != Op::Subtract || r.below(4) == 0) e.node.material = MaterialId{uint32_t(r.below(5)), 0};
+        return e;
+    };
+    for (int i = 0; i < 120; ++i) world.edits.push_back(one());
+    worlds::Live live(world.edits);
+    HostBricks host = *HostBricks::build(live.program(), world.options);
+    uint64_t baked = 0;
+    for (int step = 0; step < 60; ++step) {
+        std::vector<Edit>& edits = world.edits;
+        const size_t at = size_t(r.below(int(edits.size())));
+        switch (r.below(4)) {
+        case 0:
+            edits.insert(edits.begin() + ptrdiff_t(at), one());
+            break;
+        case 1:
+            edits.erase(edits.begin() + ptrdiff_t(at));
+            break;
+        case 2:
+            edits[at].node.transform.position = edits[at].node.transform.position + r.point(0.1f);
+            break;
+        default:
+            edits.push_back(one());
+            break;
+        }
+        const std::vector<RowChange> changes = live.become(edits);
+        ASSERT_TRUE(host.update(live.program(), changes));
+        baked += host.field().stats().bricks_baked;
+        const std::shared_ptr<const Field> full = world.field();
+        expect_equal_fields(host.field(), *full, "step " + std::to_string(step));
+        ASSERT_EQ(host.hash(), HostBricks::bake(full).hash()) << "step " << step;
+        if (HasFatalFailure()) return;
+    }
+    EXPECT_GT(baked, 1000u);
+}
+
 TEST(Field, AnUpdateThatChangesNothingBakesNothing) {
     worlds::World world = worlds::jumble();
     worlds::Live live(world.edits);

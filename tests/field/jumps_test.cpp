@@ -81,5 +81,40 @@ TEST(Jumps, ChangeOnlyWithinSevenCellsOfAChange) {
     }
 }
 
+TEST(Jumps, FollowedFromWhatCameAndWentAreThoseOfAllCells) {
+    worlds::Random r(7);
+    for (const int occupied : {0, 2, 40, 900}) {
+        Grid g = random_grid(uint32_t(occupied) + 9, {83, 19, 26}, occupied);
+        update_jumps(g.cells, {{0, 0, 0}, g.size});
+        for (int turn = 0; turn < 12; ++turn) {
+            std::vector<ivec3> came, went;
+            const ivec3 around{r.below(83), r.below(19), r.below(26)};
+            for (int i = 0; i < 1 + turn * turn; ++i) {
+                const ivec3 c{std::min(around.x + r.below(4 + 5 * (turn % 3)), 82), std::min(around.y + r.below(4), 18),
+                              std::min(around.z + r.below(4), 25)};
+                const bool there = (g.at(c.x, c.y, c.z) & kCellOccupied) != 0;
+                if (there && turn % 4 != 0) {
+                    g.cells.set(c.x, c.y, c.z, kCellInside | uint32_t(r.below(8)));
+                    went.push_back(c);
+                } else if (!there && turn % 4 != 1 && std::find(went.begin(), went.end(), c) == went.end()) {
+                    came.push_back(c);
+                }
+            }
+            raise_jumps(g.cells, went);
+            for (const ivec3 c : came) g.cells.set(c.x, c.y, c.z, kCellOccupied | 7u);
+            Grid all = g;
+            update_jumps(all.cells, {{0, 0, 0}, all.size});
+            lower_jumps(g.cells, came);
+            for (int z = 0; z < 26; ++z) {
+                for (int y = 0; y < 19; ++y) {
+                    for (int x = 0; x < 83; ++x)
+                        ASSERT_EQ(g.at(x, y, z), all.at(x, y, z))
+                            << occupied << " turn " << turn << ": " << x << " " << y << " " << z;
+                }
+            }
+        }
+    }
+}
+
 }  // namespace
 }  // namespace kiln::field
