@@ -51,12 +51,32 @@ function(kiln_shaders name)
             DEPENDS ${spv} ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
             VERBATIM)
         list(APPEND headers ${spv}.h)
+        file(RELATIVE_PATH within ${PROJECT_SOURCE_DIR}/src ${shader})
+        string(APPEND list_includes "#include \"shaders/${stem}.spv.h\"\n")
+        string(REPLACE "_" ";" parts ${stem})
+        set(camel)
+        foreach(part IN LISTS parts)
+            string(SUBSTRING ${part} 0 1 letter)
+            string(SUBSTRING ${part} 1 -1 rest)
+            string(TOUPPER ${letter} letter)
+            string(APPEND camel ${letter}${rest})
+        endforeach()
+        string(APPEND list_rows "    {\"${within}\", k${camel}Spv},\n")
         set_property(GLOBAL APPEND PROPERTY KILN_SPIRV ${spv})
         # HLSL has ray-tracing stages, but spirv-cross does not write them.
         if(stage MATCHES "^_(rgen|rint|rchit|rmiss)$")
             set_property(GLOBAL APPEND PROPERTY KILN_SPIRV_RAYS ${spv})
         endif()
     endforeach()
+    # Which words were made from which file, for live_shaders.h.
+    file(CONFIGURE OUTPUT ${KILN_GENERATED}/shaders/list_of_${arg_TARGET}.h @ONLY CONTENT
+"// Made by cmake/kiln_shaders.cmake.
+#pragma once
+
+@list_includes@
+inline constexpr ShaderSource kShaderSources[] = {
+@list_rows@};
+")
     add_custom_target(${arg_TARGET}_shaders DEPENDS ${headers})
     add_dependencies(${arg_TARGET} ${arg_TARGET}_shaders)
     target_include_directories(${arg_TARGET} PRIVATE ${KILN_GENERATED})

@@ -142,14 +142,26 @@ Result<rhi::ComputePipeline> PipelineLibrary::make(const Kernel& kernel, std::sp
     return pipeline;
 }
 
+namespace {
+
+// What stands for these words.
+std::span<const uint32_t> now(const std::map<const uint32_t*, std::vector<uint32_t>>& replaced,
+                              std::span<const uint32_t> words) {
+    const auto it = replaced.find(words.data());
+    return it != replaced.end() && !words.empty() ? std::span<const uint32_t>(it->second) : words;
+}
+
+}  // namespace
+
 Result<rhi::ComputePipeline> PipelineLibrary::get(const Kernel& kernel) {
     if (const auto it = compute_.find(kernel.name); it != compute_.end()) {
         if (it->second.words == kernel.spirv.data()) return it->second.pipeline;
         return Error{formatted("two kernels are called '{}'", kernel.name)};
     }
-    const auto pipeline = make(kernel, kernel.spirv);
+    const auto pipeline = make(kernel, now(replaced_, kernel.spirv));
     if (!pipeline) return pipeline.error();
-    compute_.emplace(std::string(kernel.name), Compute{.words = kernel.spirv.data(), .pipeline = *pipeline});
+    compute_.emplace(std::string(kernel.name),
+                     Compute{.words = kernel.spirv.data(), .pipeline = *pipeline, .kernel = kernel});
     count(kernel.name);
     return *pipeline;
 }
@@ -185,25 +197,29 @@ private:
 
 }  // namespace
 
-Result<rhi::RenderPipeline> PipelineLibrary::get(const RasterKernel& kernel) {
-    if (const auto it = raster_.find(kernel.name); it != raster_.end()) {
-        if (it->second.words == kernel.words()) return it->second.pipeline;
-        return Error{formatted("two kernels are called '{}'", kernel.name)};
-    }
+Result<rhi::RenderPipeline> PipelineLibrary::make(const RasterKernel& kernel, const Words& replaced) {
     Modules modules(*device_, kernel.name);
-    rhi::RenderPipelineDesc desc{.vertex = modules.of(kernel.vertex),
-                                 .fragment = modules.of(kernel.fragment),
+    rhi::RenderPipelineDesc desc{.vertex = modules.of(now(replaced, kernel.vertex)),
+                                 .fragment = modules.of(now(replaced, kernel.fragment)),
                                  .vertex_buffers = kernel.vertex_buffers,
                                  .topology = kernel.topology,
                                  .cull = kernel.cull,
                                  .colors = kernel.colors,
                                  .depth = kernel.depth,
                                  .label = kernel.name};
-    desc.mesh = modules.of(kernel.mesh);
+    desc.mesh = modules.of(now(replaced, kernel.mesh));
     if (modules.fault()) return *modules.fault();
-    const auto pipeline = device_->create_render_pipeline(desc);
+    return device_->create_render_pipeline(desc);
+}
+
+Result<rhi::RenderPipeline> PipelineLibrary::get(const RasterKernel& kernel) {
+    if (const auto it = raster_.find(kernel.name); it != raster_.end()) {
+        if (it->second.words == kernel.words()) return it->second.pipeline;
+        return Error{formatted("two kernels are called '{}'", kernel.name)};
+    }
+    const auto pipeline = make(kernel, replaced_);
     if (!pipeline) return pipeline.error();
-    raster_.emplace(std::string(kernel.name), Raster{.words = kernel.words(), .pipeline = *pipeline});
+    raster_.emplace(std::string(kernel.name), Raster{.words = kernel.words(), .pipeline = *pipeline, .kernel = kernel});
     count(kernel.name);
     return *pipeline;
 }
@@ -241,6 +257,49 @@ Result<void> PipelineLibrary::replace(const Kernel& kernel, std::span<const uint
     device_->destroy(it->second.pipeline);
     it->second.pipeline = *pipeline;
     ++made_;
+    return {};
+}
+
+Result<void> PipelineLibrary::replace_words(std::span<const uint32_t> old, std::span<const uint32_t> spirv) {
+    const auto was = rhi::reflect_spirv(old);
+    const auto is = rhi::reflect_spirv(spirv);
+    if (!was) return was.error();
+    if (!is) return Error{is.error().message, ErrorKind::Input};
+    if (const std::string difference = interface_difference(*was, *is); !difference.empty())
+        return Error{difference, ErrorKind::Input};
+    Words replaced = replaced_;
+    replaced[old.data()].assign(spirv.begin(), spirv.end());
+    std::vector<std::pair<Compute*, rhi::ComputePipeline>> compute;
+    std::vector<std::pair<Raster*, rhi::RenderPipeline>> raster;
+    std::optional<Error> fault;
+    for (auto& [name, c] : compute_) {
+        if (fault || c.words != old.data()) continue;
+        if (auto made = make(c.kernel, spirv))
+            compute.emplace_back(&c, *made);
+        else
+            fault = made.error();
+    }
+    for (auto& [name, r] : raster_) {
+        const RasterKernel& k = r.kernel;
+        if (fault || (k.vertex.data() != old.data() && k.fragment.data() != old.data() && k.mesh.data() != old.data()))
+            continue;
+        if (auto made = make(k, replaced))
+            raster.emplace_back(&r, *made);
+        else
+            fault = made.error();
+    }
+    // Whichever of the two are not wanted: what was, or, after a fault, what was just made.
+    for (auto& [entry, pipeline] : compute) {
+        if (!fault) std::swap(entry->pipeline, pipeline);
+        device_->destroy(pipeline);
+    }
+    for (auto& [entry, pipeline] : raster) {
+        if (!fault) std::swap(entry->pipeline, pipeline);
+        device_->destroy(pipeline);
+    }
+    if (fault) return *fault;
+    made_ += compute.size() + raster.size();
+    replaced_ = std::move(replaced);
     return {};
 }
 

@@ -86,6 +86,10 @@ public:
     // same, otherwise an error says which differ and the old pipeline stays.
     Result<void> replace(const Kernel& kernel, std::span<const uint32_t> spirv);
 
+    // Other words for every compute, vertex, fragment and mesh shader whose words begin at `old`: in pipelines made before, which are all made anew
+    // first or none is changed, and in those made later. The interface must be that of the old words.
+    Result<void> replace_words(std::span<const uint32_t> old, std::span<const uint32_t> spirv);
+
     uint64_t made() const { return made_; }
     uint64_t made_late() const { return made_late_; }  // after warm_up(): each one was a stutter
 
@@ -93,22 +97,27 @@ private:
     struct Compute {
         const uint32_t* words;  // identifies the kernel that owns the name
         rhi::ComputePipeline pipeline = {};
+        Kernel kernel = {};
     };
     struct Raster {
         const uint32_t* words;
         rhi::RenderPipeline pipeline = {};
+        RasterKernel kernel = {};
     };
     struct Trace {
         const uint32_t* words;
         rhi::TracePipeline pipeline = {};
     };
+    using Words = std::map<const uint32_t*, std::vector<uint32_t>>;
     Result<rhi::ComputePipeline> make(const Kernel& kernel, std::span<const uint32_t> spirv);
+    Result<rhi::RenderPipeline> make(const RasterKernel& kernel, const Words& replaced);
     void count(std::string_view name);
 
     rhi::Device* device_;
     std::map<std::string, Compute, std::less<>> compute_;
     std::map<std::string, Raster, std::less<>> raster_;
     std::map<std::string, Trace, std::less<>> traces_;
+    Words replaced_;  // by where the old ones begin
     uint64_t made_ = 0, made_late_ = 0;
     bool warm_ = false;
 };

@@ -9,6 +9,7 @@
 #include "render/frame.h"
 #include "render/gpu_boxes.h"
 #include "render/lens.h"
+#include "render/live_shaders.h"
 #include "render/merged.h"
 #include "render/graph_runner.h"
 #include "render/light_rects.h"
@@ -54,8 +55,9 @@ struct Renderer::Impl {
     std::unique_ptr<GpuField> field;
     std::unique_ptr<GpuInstances> instances;
     std::unique_ptr<GpuMeshes> meshes;
-    std::unique_ptr<GpuBoxes> boxes;  // once a frame asked for the tier
-    std::string fault;                // first message of the device since the last call
+    std::unique_ptr<GpuBoxes> boxes;    // once a frame asked for the tier
+    std::unique_ptr<LiveShaders> live;  // where KILN_LIVE_SHADERS asks for it
+    std::string fault;                  // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
     rhi::BufferHandle exposure;
@@ -560,6 +562,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     const bool levels = frame.levels != nullptr;
     const sdf::Program& program = levels ? *frame.levels->program() : frame.field->program();
     fault.clear();
+    if (live) live->apply(runner->pipelines());
     const uint64_t late = runner->pipelines().made_late();
     stats = {};
     stats.device = device->info().name;
@@ -708,7 +711,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
         stats.box_tree_bytes = boxes->bytes();
     }
     stats.triangles = meshes->triangles();
-    stats.clusters = meshes->clusters_in_sight();
+    stats.clusters = uint64_t{meshes->clusters_in_sight()} * uint64_t(tiles_of(settings, frame.lights.size()));
     if (!switches.cull_meshes) {
         stats.triangles_drawn = meshes->triangles_in_sight();
         stats.clusters_late = stats.clusters;
@@ -730,6 +733,9 @@ Result<Renderer> Renderer::create(const RendererOptions& options) {
     auto impl = std::make_unique<Impl>();
     impl->device = std::move(*device);
     if (auto ready = impl->prepare(); !ready) return ready.error();
+    auto live = LiveShaders::from_environment();
+    if (!live) return live.error();
+    impl->live = std::move(*live);
     return Renderer(std::move(impl));
 }
 

@@ -535,7 +535,17 @@ TEST_F(CliGpu, AMeshThatCannotBeReadIsToldAndTheRestIsDrawn) {
     EXPECT_EQ(o.code, 0) << o.err;
     EXPECT_THAT(o.err, HasSubstr("fault    m.kiln.json:1:46: meshes[0].file: m.glb: cannot be read"));
     EXPECT_THAT(o.out, HasSubstr("\"triangles\": 1, \"triangles_drawn\": 1, \"triangles_culled\": 0"));
+    EXPECT_THAT(o.out,
+                HasSubstr("\"mesh_clusters\": {\"in_sight\": 1, \"early\": 1, \"late\": 0, \"culled_percent\": 0}"));
     EXPECT_THAT(o.out, HasSubstr("\"faults\": [\"m.kiln.json:1:46: "));
+    const Outcome all =
+        run("render m.kiln.json -o a.png --size 16x16 --json --no-cull --outline-hulls --transparent-layers 0");
+    EXPECT_EQ(all.code, 0) << all.err;
+    EXPECT_THAT(all.out,
+                HasSubstr("\"mesh_clusters\": {\"in_sight\": 1, \"early\": 0, \"late\": 1, \"culled_percent\": 0}"));
+    const Outcome many = run("render m.kiln.json -o a.png --transparent-layers 17");
+    EXPECT_EQ(many.code, 2);
+    EXPECT_THAT(many.err, HasSubstr("--transparent-layers 17: it is 0 to 16"));
     EXPECT_EQ(run("validate m.kiln.json").code, 3);
 }
 

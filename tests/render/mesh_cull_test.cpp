@@ -176,6 +176,23 @@ TEST_F(MeshCullGpu, TheTierOfMeshShadersLeavesOutTheSame) {
     EXPECT_LT(double(w.drawn), 0.85 * double(w.clusters));
 }
 
+// Gates G24 and G25: shaded frames over time have the same bits in two runs, and only the first makes pipelines.
+TEST_F(MeshCullGpu, FramesHaveTheSameBitsInTwoRunsAndMakeNoPipelineLate) {
+    Stage stage;
+    uint64_t made = 0;
+    for (int i = 0; i < 4; ++i) {
+        const Frame& frame = stage.at(3 * i);
+        const RenderSettings settings{.width = 40, .height = 30, .taa = true};
+        const Picture a = rhi::must(fast->render(frame, settings)), b = rhi::must(slow->render(frame, settings));
+        EXPECT_EQ(a.rgba, b.rgba) << i;
+        EXPECT_EQ(a.srgb, b.srgb) << i;
+        EXPECT_EQ(a.depth, b.depth) << i;
+        EXPECT_TRUE(i == 0 || fast->stats().pipelines_created == made) << i;
+        made = fast->stats().pipelines_created;
+    }
+    EXPECT_GT(made, 10u);
+}
+
 // What is wholly behind the field is not given to the rasteriser once that was noticed, and comes back when the view does.
 TEST_F(MeshCullGpu, WhatTheFieldHidesIsDrawnNoMore) {
     Stage stage;

@@ -98,11 +98,11 @@ void main() {
     ivec2 high;
     float nearest;
     uint place = place_of(part, boxes[part.first_box + cluster.first / kMeshCluster], low, high, nearest);
-    if (push.late == 0u) {
+    if (push.late == 0u || place == kOutside) {  // what is out of the tile is remembered as it was
         drawn[i] = place != kOutside ? 1u : 0u;
         return;
     }
-    bool seen = place == kUnbounded || (place == kMayBeSeen && !hidden(low, high, nearest));
+    bool seen = place == kUnbounded || !hidden(low, high, nearest);
     drawn[i] = seen && drawn_early[i] == 0u ? 1u : 0u;
     cluster_seen[number] = seen ? 1u : 0u;
 }
