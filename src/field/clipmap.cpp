@@ -2,7 +2,7 @@
 // Work is done in blocks of 16³ cells (cell_maker.h), several at a time; what they made is put in place by the owner's thread, in order, so
 // that with a budget in bricks alone nothing depends on the number of workers.
 //
-// Order of work: where something that is drawn of the last level is missing, the coarsest level of the net (clipmap_net.cpp), or without a
+// Order of work: where something that is drawn of the last level is missing, a level of the net (clipmap_net.cpp), or without a
 // budget the last level itself, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are missing
 // too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser level under it,
 // and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window just moved, so in a
@@ -54,6 +54,17 @@ void each_block(const CellBox& box, Fn&& fn) {
             for (int x = first(box.min.x); x < box.max.x; x += kBlockCells) fn(ivec3{x, y, z});
         }
     }
+}
+// How many levels after the last one that of the net is which needs no more bricks than the budget has, in any world: the first of the
+// `most` that there are, else the coarsest. More than a thousand would be too many where the budget is a time.
+int net_depth(int cells, int most, uint32_t bricks) {
+    const auto worst = [&](int n) {
+        const auto side = uint32_t(((cells - 6) >> n) + 2);  // see Clipmap::net_levels()
+        return side * side * side;
+    };
+    int n = std::min(most, 1);
+    while (n < most && worst(n) > std::min(bricks, 1024u)) ++n;
+    return n;
 }
 CellBox cells_of(ivec3 block) { return {block, block + all_of(kBlockCells)}; }
 
@@ -606,13 +617,14 @@ bool Clipmap::work(const BakeBudget& budget) {
                                           std::chrono::duration<double>(std::max(budget.seconds, 0.0)));
     Run all{.workers = options_.workers};
     const int last = options_.levels - 1;
-    const int coarsest = run.timed || run.bricks != kUnlimited ? all_levels() - 1 : last;
-    net_ = net_ || (coarsest > last && needs_net());
-    if (coarsest == last)
+    const bool limited = run.timed || run.bricks != kUnlimited;
+    const int at_once = limited ? last + net_depth(options_.cells, all_levels() - options_.levels, run.bricks) : last;
+    net_ = net_ || (at_once > last && needs_net());
+    if (at_once == last)
         fill(last, all, drawn(last));
     else if (net_)
-        fill_net(coarsest, all);
-    run.spend(levels_[size_t(coarsest)].counts.baked);
+        fill_net(at_once, all);
+    run.spend(levels_[size_t(at_once)].counts.baked);
     std::vector<int> changes;
     bool missing = false;
     for (int level = 0; level < all_levels(); ++level) {
@@ -639,7 +651,6 @@ bool Clipmap::work(const BakeBudget& budget) {
         apply_all(run);
     }
     bool whole = true;
-    for (int level = coarsest; level > last && net_ && whole; --level) whole = fill_net(level, run);
     for (int level = last; level >= 0 && whole; --level)
         whole = !levels_[size_t(level)].counts.skipped && fill(level, run, window(level));
     apply_all(run);

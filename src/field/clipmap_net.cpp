@@ -3,8 +3,10 @@
 // bricks to make than a frame has; until it has them, the picture is drawn from the net wherever it has none.
 //
 // Each of the net's levels has the last one's extent in half as many cells a side as the level before it, so the coarsest needs no more than
-// kNetBricks bricks, whatever the world is. That one is made at once, all finer ones within the budget: so no frame exceeds its budget where
-// that is kNetBricks or more, and none shows a hole. A net that is not needed has no bricks, and no change costs it anything.
+// kNetBricks bricks, whatever the world is. The finest one that needs no more than a frame has, in the worst of worlds, is made at once: so no
+// frame exceeds its budget where that is kNetBricks or more, and none shows a hole. The levels between are left out: each would cost about
+// what the last level costs, since what coarse bricks lack in number their code has in length. Where the last level ends, the picture has a
+// step until it is whole. A net that is not needed has no bricks, and no change costs it anything.
 
 #include "field/clipmap.h"
 
@@ -13,7 +15,7 @@
 
 namespace kiln::field {
 
-// What is drawn of the last level is at most cells - 4 cells long, which are in (cells - 5) / 2^n + 2 cells of the net's n-th level: 5, where
+// What is drawn of the last level is at most cells - 4 cells long, which are in (cells - 6) / 2^n + 2 cells of the net's n-th level: 5, where
 // 2^n is a quarter of a level's cells.
 int Clipmap::net_levels(const ClipmapOptions& options) {
     return std::min(int(std::bit_width(uint32_t(options.cells))) - 3, kMostLevels - options.levels);

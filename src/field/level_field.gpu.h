@@ -105,7 +105,7 @@ KILN_FN void enter_brick(int level, uint word, ivec3 texel) {
     here_mixed = level + 1 < levels.drawn && level_distance(level, middle) + 4.0f > level_fade_first(levels.cells);
     if ((word & kCellFades) == 0u) return;
     ivec3 cell = ivec3(texel.x / kBrickVoxels, texel.y / kBrickVoxels, texel.z / kBrickVoxels);
-    // The net may come after the cells that are to lie on it.
+    // A level of the net need not lie under the last.
     if (level + 1 >= levels.drawn) {
         ivec3 under = ivec3(cell.x >> 1, cell.y >> 1, cell.z >> 1);
         if (!level_holds(level + 1, under) || level_word(level + 1, under) == kCellMissing) return;

@@ -142,7 +142,8 @@ TEST(Clipmap, ATimeBudgetOfNothingStillMakesTheNet) {
     Clipmap map = made(worlds::compiled(country()), {0, 0.5, 0}, kSmall);
     EXPECT_FALSE(map.work({.seconds = 0}));
     EXPECT_EQ(holes(map), 0);
-    EXPECT_EQ(baked(map), map.counts(map.all_levels() - 1).baked);
+    for (int level = 0; level < 4; ++level) EXPECT_EQ(map.counts(level).baked, 0u) << level;
+    EXPECT_GT(baked(map), 0u);
     int frames = 0;
     while (!map.work({.seconds = 0.002}) && frames < 10000) {
         ASSERT_EQ(holes(map), 0);
