@@ -20,7 +20,7 @@ struct PictureOptions {
          atlas_by_copy = false;
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high
-    std::string shadows = "rays";       ///< of meshes: rays or cascades
+    std::string shadows;                ///< of meshes: rays or cascades; empty: as the quality says, else rays
     std::string lighting = "clusters";  ///< clusters or volumes
     float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;
