@@ -60,12 +60,12 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     }
     s.tier = Tier(tier - std::begin(kTiers));
     const auto shadows = std::find(std::begin(kShadows), std::end(kShadows), o.shadows);
-    if (shadows == std::end(kShadows)) {
+    if (!o.shadows.empty() && shadows == std::end(kShadows)) {
         const std::string_view near = nearest_word(o.shadows, kShadows);
         return usage("--shadows " + o.shadows + ": there are no such shadows; " +
                      (near.empty() ? "use rays or cascades" : "did you mean " + std::string(near) + "?"));
     }
-    s.mesh_shadows = MeshShadows(shadows - std::begin(kShadows));
+    if (!o.shadows.empty()) s.mesh_shadows = MeshShadows(shadows - std::begin(kShadows));
     const auto lighting = std::find(std::begin(kLightings), std::end(kLightings), o.lighting);
     if (lighting == std::end(kLightings)) {
         const std::string_view near = nearest_word(o.lighting, kLightings);
@@ -121,7 +121,9 @@ std::string_view choose_quality(const PictureOptions& o, const Renderer& rendere
     if (o.quality.empty()) return kQualities[size_t(Quality::High)];
     const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality) - std::begin(kQualities);
     const Quality quality = o.quality == "auto" ? renderer.best_quality() : Quality(found);
+    const MeshShadows asked = s.mesh_shadows;
     set_quality(s, quality);
+    if (!o.shadows.empty()) s.mesh_shadows = asked;
     return kQualities[size_t(quality)];
 }
 

@@ -22,7 +22,7 @@ struct PictureOptions {
     int transparent_layers = 4;
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high
-    std::string shadows = "rays";       ///< of meshes: rays or cascades
+    std::string shadows;                ///< of meshes: rays or cascades; empty: as the quality says, else rays
     std::string lighting = "clusters";  ///< clusters or volumes
     float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;

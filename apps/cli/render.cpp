@@ -60,9 +60,10 @@ void add_render(CLI::App& app, Run& run) {
                      "of lamps and spots: clusters (lists by tile), or volumes (rasterised and added up): the same "
                      "picture")
         ->capture_default_str();
-    verb->add_option("--shadows", o->shadows,
-                     "of meshes under the sun: rays (exact), or cascades (shadow maps, cheaper where pixels are many)")
-        ->capture_default_str();
+    verb->add_option(
+        "--shadows", o->shadows,
+        "of meshes: rays (exact), or cascades (shadow maps, cheaper where pixels are many); left out: what "
+        "--quality says, else rays");
     verb->add_flag("--json", o->json, "one object with what it took, on stdout");
     verb->add_flag("-q,--quiet", o->quiet, "say nothing but errors");
     verb->callback([o, &run] { run = [o] { return render_picture(*o); }; });

@@ -144,8 +144,8 @@ struct Frame {
 /// that was measured, which is Compute on every device so far.
 enum class Tier : uint8_t { Auto, Compute, Rt, Mesh };
 
-/// Who finds what meshes hide of a sun. Rays: exact, whatever the light. Cascades: shadow maps for the first directional light, snapped to texels,
-/// with half shadows of the right width; other lights keep their rays.
+/// Who finds what meshes hide of a light. Rays: exact, whatever the light. Cascades: shadow maps for the first directional light, snapped to texels,
+/// and for the first lamps and spots, with half shadows of about the right width; lights that find no map keep their rays.
 enum class MeshShadows : uint8_t { Rays, Cascades };
 
 /// How point and spot lights reach the picture. Clusters: lists by tile, walked by a compute pass. Volumes: each light's ball or cone is rasterised and
@@ -179,10 +179,10 @@ struct RenderSettings {
     int shadow_map_side = 0;  ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
 };
 
-/// What a picture may cost. Low: hard shadows, surfaces as the bricks have them. Medium: hard shadows. High: everything that one picture can
+/// What a picture may cost. Low: hard shadows, of meshes by maps, surfaces as the bricks have them. Medium: the same shadows. High: everything that one picture can
 /// show. Ultra: anti-aliased over time too.
 enum class Quality : uint8_t { Low, Medium, High, Ultra };
-/// Sets `refine`, `soft_shadows` and `taa`, no more.
+/// Sets `refine`, `soft_shadows`, `mesh_shadows` and `taa`, no more.
 void set_quality(RenderSettings& settings, Quality quality);
 
 /// Pixels, top row first.

@@ -759,6 +759,7 @@ Quality Renderer::best_quality() const {
 void set_quality(RenderSettings& settings, Quality quality) {
     settings.refine = quality >= Quality::Medium;
     settings.soft_shadows = quality >= Quality::High;
+    settings.mesh_shadows = quality >= Quality::High ? MeshShadows::Rays : MeshShadows::Cascades;
     settings.taa = quality >= Quality::Ultra && settings.view == View::Shaded;
 }
 

@@ -70,7 +70,9 @@ TEST_F(FrameCostGpu, QualitiesChangeWhatTheySay) {
     // Hard shadows: a lamp without size, but for shadows alone.
     Frame small = frame;
     small.lights[0].radius = 0;
-    EXPECT_EQ(medium.rgba, rhi::must(renderer->render(small, {.width = 96, .height = 64})).rgba);
+    const RenderSettings maps{.width = 96, .height = 64, .mesh_shadows = MeshShadows::Cascades};
+    EXPECT_EQ(medium.rgba, rhi::must(renderer->render(small, maps)).rgba);
+    EXPECT_NE(medium.rgba, rhi::must(renderer->render(small, {.width = 96, .height = 64})).rgba) << "meshes have maps";
     EXPECT_NE(medium.rgba, high.rgba);
     RenderSettings ultra;
     set_quality(ultra, Quality::Ultra);
