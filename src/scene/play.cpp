@@ -63,8 +63,10 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
         if (auto moved = (*world)->move(*edit, blend(m.before, state(m).pose, between)); !moved) return moved.error();
     }
     for (const Walker& w : walkers_) {
+        const auto edit = (*world)->find_edit(w.shown);
+        if (!edit) continue;  // a command took it away
         const Pose pose = blend({w.before, {}}, {w.character.position(), {}}, between);
-        if (auto moved = (*world)->move(*(*world)->find_edit(w.shown), pose); !moved) return moved.error();
+        if (auto moved = (*world)->move(*edit, pose); !moved) return moved.error();
     }
     auto frame = (*world)->frame(camera);
     if (!frame) return frame;

@@ -168,6 +168,11 @@ TEST(Characters, AreCapsulesInPictures) {
         EXPECT_LT(frame->instances[0].pose.position.y, 2.85f - 1) << "it fell";
         EXPECT_NEAR(frame->instances[1].pose.position.z, 1.5f * 31 / 60, 0.03f) << engine;
         EXPECT_NEAR(frame->instances[1].pose.position.y, 0.5f + 0.85f, 0.03f) << engine;
+        ASSERT_TRUE(play->apply("{\"remove\": \"w (character)\"}"));
+        ASSERT_TRUE(play->step());
+        const auto without = play->frame({.position = {0, 3, 8}});
+        ASSERT_TRUE(without);
+        EXPECT_EQ(without->instances.size(), 1u) << "it walks on unseen";
     }
 }
 
