@@ -22,7 +22,6 @@ using kiln::render::ShaderSource;
 
 namespace kiln::render {
 
-
 namespace {
 
 constexpr std::chrono::milliseconds kBetweenLooks{200};
@@ -99,14 +98,16 @@ Result<std::unique_ptr<LiveShaders>> LiveShaders::watch(std::vector<std::string>
     for (const ShaderSource& source : sources) {
         std::error_code ignored;
         if (!std::filesystem::is_regular_file(first + "/" + std::string(source.file), ignored))
-            return Error{formatted("KILN_LIVE_SHADERS: '{}' has no {}; an installed program has no shader sources: name "
-                                   "the folder src of a checkout, and after a colon the folder generated of its build",
-                                   first, source.file),
-                         ErrorKind::Usage};
+            return Error{
+                formatted("KILN_LIVE_SHADERS: '{}' has no {}; an installed program has no shader sources: name "
+                          "the folder src of a checkout, and after a colon the folder generated of its build",
+                          first, source.file),
+                ErrorKind::Usage};
     }
     if (run_command("glslc --version").status != 0)
-        return Error{"KILN_LIVE_SHADERS: there is no glslc on the PATH; install it (Debian: glslc), or unset the variable",
-                     ErrorKind::Usage};
+        return Error{
+            "KILN_LIVE_SHADERS: there is no glslc on the PATH; install it (Debian: glslc), or unset the variable",
+            ErrorKind::Usage};
     return std::unique_ptr<LiveShaders>(new LiveShaders(std::move(folders), sources));
 }
 

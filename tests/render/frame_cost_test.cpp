@@ -47,7 +47,8 @@ TEST_F(FrameCostGpu, EveryPassTellsItsBytesAndTransientsShareTheirMemory) {
     EXPECT_GE(of(s.pass_bytes, "mesh shadow"), 4 * 16 * pixels + 24 * 4 + 64);
     EXPECT_LE(of(s.pass_bytes, "mesh shadow"), 4 * 16 * pixels + 8192)
         << "what stays from frame to frame does not count";
-    EXPECT_LE(of(s.pass_bytes, "march"), 16 * pixels + 8192) << "it writes words and counts; the atlas stays";
+    EXPECT_LE(of(s.pass_bytes, "march"), 20 * pixels + 8192)
+        << "it reads where meshes are and writes words and counts; the atlas stays";
     ASSERT_FALSE(s.pass_evaluations.empty());
     EXPECT_GT(of(s.pass_evaluations, "march"), 0u);
     EXPECT_EQ(s.evaluations, std::accumulate(s.pass_evaluations.begin(), s.pass_evaluations.end(), uint64_t{0},

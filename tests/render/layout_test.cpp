@@ -82,7 +82,7 @@ TEST(Layout, LevelsAreTheSame) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
     for (const auto& [kernel, number] :
-         {std::pair{&kMarchLevels, 7u}, {&kMarchLevelsInstances, 7u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
+         {std::pair{&kMarchLevels, 8u}, {&kMarchLevelsInstances, 8u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, number);
         ASSERT_TRUE(b) << kernel->name;
@@ -114,17 +114,19 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     std::vector<uint32_t> set;
     for (uint32_t i = 0; i < 16; ++i) set.push_back(i * 4);
     EXPECT_EQ(AT(InstanceSet, samples_first), 52u);
-    expect_array(kMarchInstances, 8, set, sizeof(InstanceSet));
+    expect_array(kMarchInstances, 9, set, sizeof(InstanceSet));
     std::vector<uint32_t> instance;
     for (uint32_t i = 0; i < 6; ++i) instance.push_back(i * 16);
     for (uint32_t i = 0; i < 8; ++i) instance.push_back(AT(InstanceRecord, eye_x) + i * 4);
     EXPECT_EQ(AT(InstanceRecord, before_x), 48u);
     EXPECT_EQ(AT(InstanceRecord, material), 116u);
-    expect_array(kMarchInstances, 7, instance, sizeof(InstanceRecord));
+    expect_array(kMarchInstances, 8, instance, sizeof(InstanceRecord));
     std::vector<uint32_t> node;
     for (uint32_t i = 0; i < 8; ++i) node.push_back(i * 4);
     EXPECT_EQ(AT(InstanceNode, skip), 12u);
-    expect_array(kMarchInstances, 9, node, sizeof(InstanceNode));
+    expect_array(kMarchInstances, 10, node, sizeof(InstanceNode));
+    expect_array(kMeshCull, 3, {0, 4, 8, 12, 16, 20}, sizeof(MeshBox));
+    expect_array(kMeshPack, 0, {0, 4}, sizeof(MeshClusterRef));
     expect_array(kShadow, 3, light, sizeof(LightRecord));
     expect_array(kLight, 2, light, sizeof(LightRecord));
     expect_array(kCluster, 2, light, sizeof(LightRecord));
