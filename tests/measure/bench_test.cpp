@@ -95,7 +95,7 @@ TEST(BenchSlow, FlightsMakeNoCellThatDidNotEnterAndEndAsTheyShould) {
     const std::vector<std::string> rows{"world/fly", "world/fast", "world/teleport"};
     const auto report = run_bench(rows, small({0}));
     ASSERT_TRUE(report) << report.error().message;
-    EXPECT_EQ(report->rows.size(), 12u);
+    EXPECT_EQ(report->rows.size(), 15u);
 }
 
 TEST(Bench, AChecksumFollowsTheSceneAndNothingElse) {
