@@ -599,11 +599,11 @@ private:
             const float at = w[from] + (w[to] - w[from]) * share;
             return way <= 1 && at >= way * w[side] && at <= 1 + way * (w[side] - 1);
         };
-        const float outside = 4 * h_;
-        float cost[2] = {std::fabs(height[0] + height[2]), std::fabs(height[1] + height[3])};
-        if (!stays(0, 2, 1) || !stays(0, 2, 3)) cost[0] += outside;
-        if (!stays(1, 3, 0) || !stays(1, 3, 2)) cost[1] += outside;
-        return cost[1] < cost[0] ? 1 : 0;
+        const auto in_room = [&](int from) {
+            return stays(from, (from + 2) & 3, from + 1) && stays(from, (from + 2) & 3, (from + 3) & 3);
+        };
+        const int wanted = std::fabs(height[1] + height[3]) < std::fabs(height[0] + height[2]) ? 1 : 0;
+        return in_room(wanted) || !in_room(1 - wanted) ? wanted : 1 - wanted;
     }
 
     const MeshEdges& edges_;

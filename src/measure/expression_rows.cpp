@@ -27,9 +27,7 @@ void picture(BenchRun& run, const sdf::Formula& model, int threads) {
     std::vector<uint8_t> fast, slow;
     const std::vector<double> least = least_seconds(
         run.options.runs,
-        {[&] {
-             return seconds_of([&] { fast = sdf::formula_image(model, view, sdf::best_isa(), nullptr, threads); });
-         },
+        {[&] { return seconds_of([&] { fast = sdf::formula_image(model, view, sdf::best_isa(), nullptr, threads); }); },
          [&] { return seconds_of([&] { slow = sdf::formula_image_slow(model, view, sdf::best_isa(), threads); }); }});
     BenchRow out = row("picture", "ms");
     out.value = least[0] * 1e3;
@@ -46,7 +44,8 @@ void picture(BenchRun& run, const sdf::Formula& model, int threads) {
 
 BenchFamily expression_family() {
     return {{"expression",
-             "a plane model of 7,866 operations (letters) as 1024 x 1024 pixels: through intervals, beside brute force by SIMD",
+             "a plane model of 7,866 operations (letters) as 1024 x 1024 pixels: through intervals, beside brute force "
+             "by SIMD",
              {"picture"}},
             [](BenchRun& run) {
                 if (!run.wanted("expression", "picture") || run.fault()) return;

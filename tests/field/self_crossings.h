@@ -73,7 +73,8 @@ private:
     // Six times the volume of a, b, c, d, by its sign; 0 where rounding could have made it.
     static int side(vec3 a, vec3 b, vec3 c, vec3 d) {
         const auto less = [&d](vec3 p) {
-            return std::array<double, 3>{double(p.x) - double(d.x), double(p.y) - double(d.y), double(p.z) - double(d.z)};
+            return std::array<double, 3>{double(p.x) - double(d.x), double(p.y) - double(d.y),
+                                         double(p.z) - double(d.z)};
         };
         const auto u = less(a), v = less(b), w = less(c);  // exact
         double volume = 0, size = 0;
@@ -94,8 +95,8 @@ private:
     }
     bool cross(uint32_t s, uint32_t t) const {
         const Box p = box_of(s), q = box_of(t);
-        if (p.high.x < q.low.x || q.high.x < p.low.x || p.high.y < q.low.y || q.high.y < p.low.y || p.high.z < q.low.z ||
-            q.high.z < p.low.z)
+        if (p.high.x < q.low.x || q.high.x < p.low.x || p.high.y < q.low.y || q.high.y < p.low.y ||
+            p.high.z < q.low.z || q.high.z < p.low.z)
             return false;
         if (common(s, t) > 1) return false;
         const auto edges_pierce = [this](uint32_t one, uint32_t other) {
@@ -103,7 +104,8 @@ private:
             for (size_t i = 0; i < 3; ++i) {
                 const uint32_t from = triangles_[3 * size_t(one) + i], to = triangles_[3 * size_t(one) + (i + 1) % 3];
                 if (std::count(three, three + 3, from) + std::count(three, three + 3, to) > 0) continue;
-                if (pierces(positions_[from], positions_[to], corner(other, 0), corner(other, 1), corner(other, 2))) return true;
+                if (pierces(positions_[from], positions_[to], corner(other, 0), corner(other, 1), corner(other, 2)))
+                    return true;
             }
             return false;
         };

@@ -17,8 +17,9 @@ Crossings crossings(const Mesh& mesh, float voxel_size) {
 
 worlds::World gyroid() {
     worlds::World w{"gyroid", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}}}};
-    w.edits.push_back(worlds::edit(Expression{
-        .expression = "(sin(4*x)*cos(4*y) + sin(4*y)*cos(4*z) + sin(4*z)*cos(4*x)) / 8", .half_extents = {1.4f, 1.4f, 1.4f}}));
+    w.edits.push_back(
+        worlds::edit(Expression{.expression = "(sin(4*x)*cos(4*y) + sin(4*y)*cos(4*z) + sin(4*z)*cos(4*x)) / 8",
+                                .half_extents = {1.4f, 1.4f, 1.4f}}));
     w.edits.push_back(worlds::edit(Sphere{.radius = 1.2f}, {}, Op::Intersect));
     return w;
 }
