@@ -4,6 +4,8 @@
 
 #include "random_scenes.h"
 
+#include <kiln/shapes.h>
+
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -14,7 +16,18 @@ namespace {
 TEST(EvaluateFew, AFewPointsHaveTheBitsOfManyOnEveryInstructionSet) {
     constexpr int kPoints = 64;
     for (uint32_t seed = 0; seed < 40; ++seed) {
-        const Scene scene = random_scene(seed, 12);
+        Scene scene = random_scene(seed, 12);
+        Random place(900 + seed);
+        for (int i = 0; seed % 2 == 0 && i < 6; ++i) {  // as most edits are, not turned
+            Edit edit;
+            if (i % 2 == 0) {
+                edit.node.shape = Sphere{.radius = 0.3f};
+            } else {
+                edit.node.shape = Box{.half_extents = {0.3f, 0.2f, 0.4f}};
+            }
+            edit.node.transform.position = place.point(2);
+            scene.edits.push_back(edit);
+        }
         const auto program = compile(scene.source());
         ASSERT_TRUE(program) << seed;
         Random random(500 + seed);
