@@ -2,9 +2,8 @@
 // A large plane model as a picture of 1024 x 1024 pixels: through intervals, and every operation at every pixel (the brute force the
 // ratio is taken against). KILN_MODEL names a .vm file; without it a generated model of about 7900 operations is drawn.
 
+#include "measure/letters.h"
 #include "sdf/expression_image.h"
-
-#include "tests/sdf/model_text.h"
 
 #include <benchmark/benchmark.h>
 
@@ -17,7 +16,7 @@ namespace {
 
 const Formula& model() {
     static const Formula formula = [] {
-        std::string text = letters_model(335);
+        std::string text = measure::letters_model(335);
         if (const char* path = std::getenv("KILN_MODEL")) {
             std::ifstream in(path);
             std::ostringstream all;
@@ -57,7 +56,7 @@ void BM_model_picture_brute_force(benchmark::State& state) {
 }
 
 void BM_model_read(benchmark::State& state) {
-    const std::string text = letters_model(335);
+    const std::string text = measure::letters_model(335);
     for (auto _ : state) benchmark::DoNotOptimize(read_vm(text));
 }
 

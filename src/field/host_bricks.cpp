@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 namespace kiln::field {
 namespace {
@@ -235,12 +236,14 @@ void HostBricks::march_refined(std::span<const Ray> rays, MarchHit* hits, sdf::I
 }
 
 void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, bool refine, sdf::Isa isa) const {
-    constexpr size_t kBlock = 512;
+    constexpr size_t kBlock = RayRefiner::kMostRays;
     const WideView& view = wide_view();
     const double h = double(view.grid.voxel_size);
     int32_t whole[3][kBlock];
     float part[3][kBlock], direction[3][kBlock], far[kBlock];
-    NearPass passes[kBlock];
+    RayNote notes[kBlock];
+    std::optional<RayRefiner> refiner;
+    if (refine) refiner.emplace(*field_, isa);
     for (size_t first = 0; first < rays.size(); first += kBlock) {
         const size_t count = std::min(kBlock, rays.size() - first);
         for (size_t i = 0; i < count; ++i) {
@@ -257,19 +260,28 @@ void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, bool refine, s
                 part[0][i] = texels.part.x, part[1][i] = texels.part.y, part[2][i] = texels.part.z;
             }
             direction[0][i] = ray.direction.x, direction[1][i] = ray.direction.y, direction[2][i] = ray.direction.z;
-            far[i] = float(std::min(double(ray.t_max) / h, double(kFarVoxels)));
+            far[i] = i > 0 && ray.t_max == rays[first + i - 1].t_max
+                         ? far[i - 1]
+                         : float(std::min(double(ray.t_max) / h, double(kFarVoxels)));
         }
         const WideRays wide{{whole[0], whole[1], whole[2]},
                             {part[0], part[1], part[2]},
                             {direction[0], direction[1], direction[2]},
                             far};
-        wide_march(view, wide, int(count), hits + first, refine ? passes : nullptr, isa);
-        for (size_t i = 0; i < count; ++i) {
-            MarchHit& hit = hits[first + i];
-            if (hit.state == kMarchHit)
-                hit.slot = int(field_->cell_word(hit.cell.x, hit.cell.y, hit.cell.z) & kCellSlotMask);
+        const std::span found(hits + first, count);
+        wide_march(view, wide, int(count), found.data(), refine ? notes : nullptr, isa);
+        if (refine) {
+            refiner->run(wide, found, std::span(notes).first(count));
+            continue;
         }
-        if (refine) RayRefiner(*field_, wide, {hits + first, count}, isa).run(std::span(passes).first(count));
+        const MarchHit* before = nullptr;  // neighbours in the list often are so in space
+        for (MarchHit& hit : found) {
+            if (hit.state != kMarchHit) continue;
+            hit.slot = before != nullptr && before->cell == hit.cell
+                           ? before->slot
+                           : int(field_->cell_word(hit.cell.x, hit.cell.y, hit.cell.z) & kCellSlotMask);
+            before = &hit;
+        }
     }
 }
 

@@ -292,6 +292,9 @@ public:
                     for (const uint8_t* edge = begin; edge != end; ++edge)
                         around_[4 * size_t(from[kEdgeOffset[*edge]]) + (*edge & 3u)] = first + made;
                     meet(begin, end, from, sheet);
+                    // Two sheets of a voxel would reach through each other, were they to look for their creases. The crossings' hulls
+                    // are apart.
+                    if (loops.count > 1) sheet.at = safe(index, numbers, sheet).middle;
                 }
             }
         }
@@ -321,7 +324,7 @@ public:
                     const bool forward = low_is_solid != (axis == 1);
                     const uint32_t ring[4] = {q[0], forward ? q[1] : q[2], q[3], forward ? q[2] : q[1]};
                     const vec3 middle = world(index, z * 64 + bit, on_edge(axis, crossings_[e][3]));
-                    const int first = diagonal(ring, middle, axis, low_is_solid, crossings_[e]);
+                    const int first = diagonal(ring, world(index, z * 64 + bit, {}), middle, axis, crossings_[e]);
                     for (const int corner : {0, 1, 2, 0, 2, 3}) *to++ = ring[(first + corner) & 3];
                 }
             }
@@ -573,25 +576,34 @@ private:
     }
 
     // Corner that the quad's diagonal starts from. The surface passes the quad's edge at the crossing: the diagonal nearer to it
-    // lies along a crease. One that turns a triangle over, as seen along the edge, comes last.
-    int diagonal(const uint32_t (&ring)[4], vec3 middle, int axis, bool towards_high, const Crossing& c) const {
+    // lies along a crease. One that leaves the quad's own room comes last: the four tetrahedra of the lattice edge, a vertex and the next
+    // one. Rooms of different edges only share faces, so quads that stay in theirs do not cross (Ju and Udeshi, "Intersection-free
+    // contouring on an octree grid", 2006).
+    int diagonal(const uint32_t (&ring)[4], vec3 low, vec3 middle, int axis, const Crossing& c) const {
         const vec3 normal{c[0], c[1], c[2]};
-        float u[4], v[4], height[4];
+        float u[4], v[4], w[4], height[4];  // u, v across the edge from its line, w along it, voxels from its lower end
         for (size_t i = 0; i < 4; ++i) {
-            const vec3 p = out_.positions[ring[i]] - middle;
-            height[i] = dot(p, normal);
+            const vec3 at = out_.positions[ring[i]], p = (at - low) * per_voxel_;
+            height[i] = dot(at - middle, normal);
             u[i] = axis == 0 ? p.y : axis == 1 ? p.z : p.x;
             v[i] = axis == 0 ? p.z : axis == 1 ? p.x : p.y;
+            w[i] = axis == 0 ? p.x : axis == 1 ? p.y : p.z;
         }
-        const auto area = [&](int i, int j, int k) {
-            const float doubled = (u[j] - u[i]) * (v[k] - v[i]) - (v[j] - v[i]) * (u[k] - u[i]);
-            return towards_high ? doubled : -doubled;
+        // The diagonal passes the edge's line on the side of corner `side` where it meets the half plane of that corner.
+        const auto stays = [&](int from, int to, int side) {
+            const float before = u[from] * v[side] - v[from] * u[side], after = u[to] * v[side] - v[to] * u[side];
+            const float share = before / (before - after);
+            const float x = u[from] + (u[to] - u[from]) * share, y = v[from] + (v[to] - v[from]) * share;
+            const float way = (x * u[side] + y * v[side]) / (u[side] * u[side] + v[side] * v[side]);
+            if (way < 0) return true;  // on the other side, which is asked too
+            const float at = w[from] + (w[to] - w[from]) * share;
+            return way <= 1 && at >= way * w[side] && at <= 1 + way * (w[side] - 1);
         };
-        const float turned = 4 * h_;
-        float cost[2] = {std::fabs(height[0] + height[2]), std::fabs(height[1] + height[3])};
-        if (std::min(area(0, 1, 2), area(0, 2, 3)) < 0) cost[0] += turned;
-        if (std::min(area(1, 2, 3), area(1, 3, 0)) < 0) cost[1] += turned;
-        return cost[1] < cost[0] ? 1 : 0;
+        const auto in_room = [&](int from) {
+            return stays(from, (from + 2) & 3, from + 1) && stays(from, (from + 2) & 3, (from + 3) & 3);
+        };
+        const int wanted = std::fabs(height[1] + height[3]) < std::fabs(height[0] + height[2]) ? 1 : 0;
+        return in_room(wanted) || !in_room(1 - wanted) ? wanted : 1 - wanted;
     }
 
     const MeshEdges& edges_;

@@ -2,8 +2,8 @@
 #include "field/ray_refiner.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <utility>
 
 namespace kiln::field {
 namespace {
@@ -11,194 +11,201 @@ namespace {
 constexpr int kSearchLooks = 8;       // along a stretch of a ray
 constexpr int kSearchRounds = 3;      // each on a stretch some 3.5 times shorter
 constexpr float kSearchMore = 0.25f;  // voxels before and behind the voxel that was passed
-constexpr float kSlopeStep = 0.125f;  // voxels between the two looks that a slope is taken from
-constexpr float kNearEnough = 0.02f;  // voxels: one more step from there ends within a tenth of it, slopes being known
-constexpr float kFlattest = -0.02f;
 constexpr int kPolishRounds = 6;
-constexpr float kFurthest = 1.5f;      // voxels: a surface further away is another one
-constexpr uint32_t kRemembered = 256;  // bricks
+constexpr int kFew = 16;  // points that cost less than kLooks
 
 }  // namespace
 
-RayRefiner::RayRefiner(const Field& field, const WideRays& rays, std::span<MarchHit> hits, sdf::Isa isa)
-    : field_(field), rays_(rays), hits_(hits), isa_(isa) {
-    targets_.reserve(hits.size());
+void RayRefiner::run(const WideRays& rays, std::span<MarchHit> hits, std::span<const RayNote> notes) {
+    rays_ = &rays, hits_ = hits, notes_ = notes;
+    brick_count_ = 0;
+    remembered_.fill(-1);
+    for (int i = 0; i < int(hits.size()); ++i) {
+        const RayNote& note = notes[size_t(i)];
+        MarchHit& hit = hits[size_t(i)];
+        found_[size_t(i)].yes = false;
+        if (note.least < kNearPassVoxels && (hit.state == kMarchMiss || hit.t >= note.to)) {
+            int& first = bricks_[size_t(brick_at(note.cell))].passed_by;
+            next_passed_[size_t(i)] = int16_t(first);
+            first = i;
+        }
+        if (hit.state == kMarchHit) {
+            const int at = brick_at(hit.cell);
+            hit.slot = at;    // until slots are known
+            if (hit.t > 0) {  // one that starts in solid stays there
+                int& first = bricks_[size_t(at)].hit_by;
+                next_hit_[size_t(i)] = int16_t(first);
+                first = i;
+            }
+        }
+    }
+    // What is far from the processor is asked for, of all bricks, before any of it is needed.
+    const std::span bricks = std::span(bricks_).first(size_t(brick_count_));
+    for (Brick& brick : bricks) {
+        brick.code = field_.code_of(brick.slot);
+        __builtin_prefetch(brick.code.data());
+        __builtin_prefetch(brick.code.data() + 8);
+    }
+    for (MarchHit& hit : hits) {
+        if (hit.state == kMarchHit) hit.slot = int(bricks[size_t(hit.slot)].slot);
+    }
+    for (Brick& brick : bricks) search(brick);
+    for (Brick& brick : bricks) polish(brick);
 }
 
-void RayRefiner::look(size_t to, int ray, float t) {
-    const double h = double(field_.grid().voxel_size);
-    const auto metres = [&](size_t axis) {
-        const double begin = double(rays_.whole[axis][ray]) + double(rays_.part[axis][ray]);
-        return float((begin + double(rays_.direction[axis][ray]) * double(t)) * h);
+// A brick whose place another one takes comes a second time, which costs time and changes nothing.
+int RayRefiner::brick_at(ivec3 cell) {
+    if (brick_count_ > 0 && bricks_[size_t(last_)].cell == cell) return last_;  // as most rays
+    const uint32_t hash = uint32_t(cell.x) + uint32_t(cell.y) * 19u + uint32_t(cell.z) * 101u;
+    int16_t& place = remembered_[hash % kRemembered];
+    if (place >= 0 && bricks_[size_t(place)].cell == cell) return last_ = place;
+    place = int16_t(brick_count_++);
+    const uint32_t slot = field_.cell_word(cell.x, cell.y, cell.z) & kCellSlotMask;
+    __builtin_prefetch(&field_.records()[slot]);
+    bricks_[size_t(place)] = {cell, slot, {}, -1, -1};
+    return last_ = place;
+}
+
+// Where a ray is, voxels from the brick's first texel.
+std::array<float, 3> RayRefiner::in_brick(const Brick& brick, int ray, float t) const {
+    const auto axis = [&](size_t a, int cell) {
+        return float(double(rays_->whole[a][ray] - cell * kBrickVoxels) + double(rays_->part[a][ray]) +
+                     double(rays_->direction[a][ray]) * double(t));
     };
-    looks_.x[to] = metres(0);
-    looks_.y[to] = metres(1);
-    looks_.z[to] = metres(2);
+    return {axis(0, brick.cell.x), axis(1, brick.cell.y), axis(2, brick.cell.z)};
 }
 
-// All points: those that nobody asks about are of before, and as cheap.
-void RayRefiner::evaluate(uint32_t slot) {
-    sdf::evaluate(sdf::view(field_.program(), field_.code_of(slot)), {looks_.x, looks_.y, looks_.z, kLooks}, looks_.d,
+// Sixteen points or all: those that nobody asks about are of before, and as cheap.
+void RayRefiner::evaluate(const Brick& brick, int count) {
+    sdf::evaluate(sdf::view(field_.program(), brick.code),
+                  {looks_.x.data(), looks_.y.data(), looks_.z.data(), count <= kFew ? kFew : kLooks}, looks_.d.data(),
                   isa_);
-    const float voxels = 1.0f / field_.grid().voxel_size;
-    for (float& d : looks_.d) d *= voxels;
-}
-
-void RayRefiner::collect(int ray, uint32_t slot, float from, float to) {
-    targets_.push_back({ray, slot, -1, from, to});
-}
-
-// fn(slot, targets), at most kMost of one brick at a time.
-template <int kMost, typename Fn>
-void RayRefiner::each_brick(Fn&& fn) {
-    // A brick that another one's place is taken by comes a second time, which costs time and changes nothing.
-    std::array<int, kRemembered> last;
-    last.fill(-1);
-    firsts_.clear();
-    for (int i = 0; i < int(targets_.size()); ++i) {
-        int& before = last[targets_[size_t(i)].slot % kRemembered];
-        if (before >= 0 && targets_[size_t(before)].slot == targets_[size_t(i)].slot) {
-            targets_[size_t(before)].next = i;
-        } else {
-            firsts_.push_back(i);
-        }
-        before = i;
-    }
-    std::array<const Target*, size_t(kMost)> some;
-    for (const int first : firsts_) {
-        size_t n = 0;
-        for (int i = first; i >= 0; i = targets_[size_t(i)].next) {
-            some[n++] = &targets_[size_t(i)];
-            if (n < some.size() && targets_[size_t(i)].next >= 0) continue;
-            fn(targets_[size_t(first)].slot, std::span(some).first(n));
-            n = 0;
-        }
-    }
-    targets_.clear();
-}
-
-void RayRefiner::run(std::span<const NearPass> passes) {
-    for (size_t i = 0; i < passes.size(); ++i) {
-        const NearPass& pass = passes[i];
-        if (!(pass.least < kNearPassVoxels) || (hits_[i].state != kMarchMiss && hits_[i].t < pass.to)) continue;
-        const uint32_t word = field_.cell_word(pass.cell.x, pass.cell.y, pass.cell.z);
-        collect(int(i), word & kCellSlotMask, std::max(pass.from - kSearchMore, 0.0f),
-                std::min(pass.to + kSearchMore, rays_.t_max[i]));
-    }
-    each_brick<kLooks / kSearchLooks>([&](uint32_t slot, std::span<const Target*> some) { search(slot, some); });
-    for (size_t i = 0; i < hits_.size(); ++i) {
-        // One that starts in solid stays there.
-        if (hits_[i].state == kMarchHit && hits_[i].t > 0)
-            collect(int(i), uint32_t(hits_[i].slot), hits_[i].t, hits_[i].t);
-    }
-    each_brick<kLooks / 2>([&](uint32_t slot, std::span<const Target*> some) { polish(slot, some); });
 }
 
 // The code's value changes by no more than one moves: two looks whose values together exceed what lies between them leave no room for a
 // surface. Else the next round looks closer, around the least.
-void RayRefiner::search(uint32_t slot, std::span<const Target*> passes) {
+void RayRefiner::search(const Brick& brick) {
     struct Stretch {
-        const Target* target;
-        float from, to;
-    };
-    std::array<Stretch, size_t(kLooks / kSearchLooks)> open;
-    size_t count = 0;
-    for (const Target* pass : passes) open[count++] = {pass, pass->from, pass->to};
-    for (int round = 0; round < kSearchRounds && count > 0; ++round) {
-        const auto at = [](const Stretch& s, int k) {
-            return s.from + (s.to - s.from) * (float(k) / float(kSearchLooks - 1));
-        };
-        for (size_t i = 0; i < count; ++i) {
-            for (int k = 0; k < kSearchLooks; ++k) {
-                look(i * kSearchLooks + size_t(k), open[i].target->ray, at(open[i], k));
-            }
-        }
-        evaluate(slot);
-        size_t left = 0;
-        for (size_t i = 0; i < count; ++i) {
-            const Stretch stretch = open[i];
-            const float* const d = looks_.d + i * kSearchLooks;
-            int least = 0, solid = -1;
-            for (int k = 0; k < kSearchLooks && solid < 0; ++k) {
-                if (d[k] <= 0) solid = k;
-                if (d[k] < d[least]) least = k;
-            }
-            if (solid >= 0) {
-                const float before = at(stretch, std::max(solid - 1, 0)), behind = at(stretch, solid);
-                const float t =
-                    solid == 0 ? behind : before + (behind - before) * (d[solid - 1] / (d[solid - 1] - d[solid]));
-                MarchHit& hit = hits_[size_t(stretch.target->ray)];
-                const BrickRecord& record = field_.records()[slot];
-                hit.state = kMarchHit;
-                hit.slot = int(slot);
-                hit.cell = {record.texel_x / kBrickVoxels, record.texel_y / kBrickVoxels,
-                            record.texel_z / kBrickVoxels};
-                place(stretch.target->ray, t);
-                continue;
-            }
-            const int low = std::max(least - 1, 0), high = std::min(least + 1, kSearchLooks - 1);
-            const float gap = (stretch.to - stretch.from) / float(kSearchLooks - 1);
-            if (d[low] + d[least] > gap && d[least] + d[high] > gap) continue;
-            open[left++] = {stretch.target, at(stretch, low), at(stretch, high)};
-        }
-        count = left;
-    }
-}
-
-// By the secant of two looks.
-void RayRefiner::polish(uint32_t slot, std::span<const Target*> found) {
-    struct Point {
         int ray;
-        float first, t, t_before, d_before;
+        float from, to;
+        std::array<float, 3> begin;  // where the ray is at t_begin
+        float t_begin;
     };
-    std::array<Point, size_t(kLooks / 2)> open;
-    size_t count = 0;
-    for (const Target* target : found) {
-        const float before = std::max(target->from - kSlopeStep, 0.0f);
-        look(count, target->ray, target->from);
-        look(kLooks / 2 + count, target->ray, before);
-        open[count++] = {target->ray, target->from, target->from, before, 0};
-    }
-    for (int round = 0; round < kPolishRounds && count > 0; ++round) {
-        evaluate(slot);
-        size_t left = 0;
-        for (size_t i = 0; i < count; ++i) {
-            Point p = open[i];
-            const float d = looks_.d[i];
-            if (round == 0) p.d_before = looks_.d[kLooks / 2 + i];
-            const float moved = p.t - p.t_before;
-            const float slope = std::fabs(moved) > 1e-5f ? (d - p.d_before) / moved : -1.0f;
-            const bool enters = slope < kFlattest;
-            float next = p.t - std::clamp(d / slope, -kFurthest, kFurthest);
-            if (!enters) {
-                // Along the surface, or out of something thinner than a voxel: whose front is before.
-                next = d > kNearEnough ? p.t + d : std::min(p.t, p.t_before) - std::max(std::fabs(d), kSlopeStep);
-            }
-            if (!(std::fabs(next - p.first) <= kFurthest)) continue;  // it stays where it was
-            if (enters && std::fabs(d) <= kNearEnough) {
-                place(p.ray, std::clamp(next, 0.0f, rays_.t_max[p.ray]));
-            } else {
-                open[left++] = {p.ray, p.first, next, p.t, d};
-            }
+    constexpr int kMost = kLooks / kSearchLooks;
+    std::array<Stretch, size_t(kMost)> open;
+    const float h = field_.grid().voxel_size, voxels = 1.0f / h;
+    const std::array<float, 3> base{float(brick.cell.x * kBrickVoxels), float(brick.cell.y * kBrickVoxels),
+                                    float(brick.cell.z * kBrickVoxels)};
+    for (int next = brick.passed_by; next >= 0;) {
+        int count = 0;
+        for (; next >= 0 && count < kMost; next = next_passed_[size_t(next)]) {
+            const RayNote& note = notes_[size_t(next)];
+            const float from = std::max(note.from - kSearchMore, 0.0f);
+            open[size_t(count++)] = {next, from, std::min(note.to + kSearchMore, rays_->t_max[next]),
+                                     in_brick(brick, next, from), from};
         }
-        count = left;
-        for (size_t i = 0; i < count; ++i) look(i, open[i].ray, open[i].t);
+        for (int round = 0; round < kSearchRounds && count > 0; ++round) {
+            for (int i = 0; i < count; ++i) {
+                const Stretch& s = open[size_t(i)];
+                const float gap = (s.to - s.from) / float(kSearchLooks - 1);
+                const auto axis = [&](size_t a, std::array<float, kLooks>& out) {
+                    const float along = rays_->direction[a][s.ray], begin = s.begin[a], first = s.from - s.t_begin;
+                    for (int k = 0; k < kSearchLooks; ++k)
+                        out[size_t(i * kSearchLooks + k)] = (base[a] + (begin + along * (first + gap * float(k)))) * h;
+                };
+                axis(0, looks_.x), axis(1, looks_.y), axis(2, looks_.z);
+            }
+            evaluate(brick, count * kSearchLooks);
+            int left = 0;
+            for (int i = 0; i < count; ++i) {
+                const Stretch s = open[size_t(i)];
+                const float gap = (s.to - s.from) / float(kSearchLooks - 1);
+                const auto at = [&](size_t k) { return s.from + gap * float(k); };
+                std::array<float, kSearchLooks> d;
+                for (int k = 0; k < kSearchLooks; ++k) d[size_t(k)] = looks_.d[size_t(i * kSearchLooks + k)] * voxels;
+                size_t least = 0, solid = kSearchLooks;
+                for (size_t k = kSearchLooks; k-- > 0;) {
+                    if (d[k] <= 0) solid = k;
+                    if (d[k] <= d[least]) least = k;
+                }
+                if (solid < kSearchLooks) {
+                    const float slope = solid == 0 ? -1.0f : (d[solid] - d[solid - 1]) / gap;
+                    const float t = solid == 0 ? at(0) : at(solid) - d[solid] / slope;
+                    MarchHit& hit = hits_[size_t(s.ray)];
+                    hit.state = kMarchHit;
+                    hit.t = t;
+                    hit.slot = int(brick.slot);
+                    hit.cell = brick.cell;
+                    std::array<float, 3> there;
+                    for (size_t a = 0; a < 3; ++a) there[a] = s.begin[a] + rays_->direction[a][s.ray] * (t - s.t_begin);
+                    for (size_t a = 0; a < 3; ++a) {
+                        const float voxel = std::clamp(std::floor(there[a]), 0.0f, float(kBrickVoxels - 1));
+                        (a == 0 ? hit.voxel.x : a == 1 ? hit.voxel.y : hit.voxel.z) = int(voxel);
+                        (a == 0 ? hit.p.x : a == 1 ? hit.p.y : hit.p.z) = std::clamp(there[a] - voxel, 0.0f, 1.0f);
+                    }
+                    found_[size_t(s.ray)] = {true, slope, there};
+                    continue;
+                }
+                const size_t low = least > 0 ? least - 1 : 0, high = std::min<size_t>(least + 1, kSearchLooks - 1);
+                if (d[low] + d[least] > gap && d[least] + d[high] > gap) continue;
+                open[size_t(left++)] = {s.ray, at(low), at(high), s.begin, s.t_begin};
+            }
+            count = left;
+        }
     }
 }
 
-// The hit at t, in its brick.
-void RayRefiner::place(int ray, float t) {
-    MarchHit& hit = hits_[size_t(ray)];
-    hit.t = t;
-    const auto axis = [&](size_t a, int cell, int& voxel, float& p) {
-        const double q = double(rays_.whole[a][ray] - cell * kBrickVoxels) + double(rays_.part[a][ray]) +
-                         double(rays_.direction[a][ray]) * double(t);
-        voxel = std::clamp(int(q + kBrickVoxels) - kBrickVoxels, 0, kBrickVoxels - 1);  // nothing moves as far as that
-        p = float(std::clamp(q - voxel, 0.0, 1.0));
+void RayRefiner::polish(const Brick& brick) {
+    RayPolish& lanes = polish_;
+    int count = 0;
+    const auto add = [&](int ray, float x, float y, float z, float slope) {
+        const int i = count++;
+        polished_[size_t(i)] = ray;
+        lanes.first[0][i] = x, lanes.first[1][i] = y, lanes.first[2][i] = z;
+        for (int axis = 0; axis < 3; ++axis) lanes.along[axis][i] = rays_->direction[axis][ray];
+        lanes.slope[i] = slope;
+        if (count == RayPolish::kMost) polish_all(brick, std::exchange(count, 0));
     };
-    axis(0, hit.cell.x, hit.voxel.x, hit.p.x);
-    axis(1, hit.cell.y, hit.voxel.y, hit.p.y);
-    axis(2, hit.cell.z, hit.voxel.z, hit.p.z);
+    for (int ray = brick.hit_by; ray >= 0; ray = next_hit_[size_t(ray)]) {
+        if (found_[size_t(ray)].yes) continue;  // somewhere else, before
+        const MarchHit& hit = hits_[size_t(ray)];
+        add(ray, float(hit.voxel.x) + hit.p.x, float(hit.voxel.y) + hit.p.y, float(hit.voxel.z) + hit.p.z,
+            notes_[size_t(ray)].slope);
+    }
+    for (int ray = brick.passed_by; ray >= 0; ray = next_passed_[size_t(ray)]) {
+        const Found& found = found_[size_t(ray)];
+        if (found.yes) add(ray, found.in_brick[0], found.in_brick[1], found.in_brick[2], found.slope);
+    }
+    if (count > 0) polish_all(brick, count);
+}
+
+// The first `count` of polish_, whose rays are polished_.
+void RayRefiner::polish_all(const Brick& brick, int count) {
+    RayPolish& lanes = polish_;
+    lanes.voxel_size = field_.grid().voxel_size;
+    lanes.base[0] = float(brick.cell.x * kBrickVoxels);
+    lanes.base[1] = float(brick.cell.y * kBrickVoxels);
+    lanes.base[2] = float(brick.cell.z * kBrickVoxels);
+    lanes.round = 0;
+    const int padded = (count + kFew - 1) / kFew * kFew;
+    for (int i = 0; i < padded; ++i) {
+        lanes.t[i] = 0, lanes.t_before[i] = -RayPolish::kStepBack, lanes.d_before[i] = 0;
+        lanes.state[i] = i < count ? RayPolish::kOpen : RayPolish::kIdle;
+    }
+    for (int open = count; open > 0 && lanes.round < kPolishRounds;) {
+        wide_polish_looks(lanes, padded, looks_.x.data(), looks_.y.data(), looks_.z.data(), isa_);
+        evaluate(brick, padded);
+        open = wide_polish_steps(lanes, padded, looks_.d.data(), isa_);
+    }
+    wide_polish_places(lanes, padded, isa_);
+    for (int i = 0; i < count; ++i) {
+        if (lanes.state[i] != RayPolish::kDone) continue;
+        const int ray = polished_[size_t(i)];
+        MarchHit& hit = hits_[size_t(ray)];
+        hit.t = std::clamp(hit.t + lanes.t[i], 0.0f, rays_->t_max[ray]);
+        hit.voxel = {lanes.voxel[0][i], lanes.voxel[1][i], lanes.voxel[2][i]};
+        hit.p = {lanes.p[0][i], lanes.p[1][i], lanes.p[2][i]};
+    }
 }
 
 }  // namespace kiln::field

@@ -9,47 +9,65 @@
 #include "field/field.h"
 #include "field/wide.h"
 
+#include <array>
 #include <span>
-#include <vector>
 
 namespace kiln::field {
 
 class RayRefiner {
 public:
-    RayRefiner(const Field& field, const WideRays& rays, std::span<MarchHit> hits, sdf::Isa isa);
+    static constexpr int kMostRays = 1024;
 
-    /// `hits` and `passes` are what wide_march() found; slots of hits are known.
-    void run(std::span<const NearPass> passes);
+    RayRefiner(const Field& field, sdf::Isa isa) : field_(field), isa_(isa) {}
+
+    /// `hits` and `notes` are what wide_march() found of `rays`, kMostRays at most. Slots of hits are filled in.
+    void run(const WideRays& rays, std::span<MarchHit> hits, std::span<const RayNote> notes);
 
 private:
-    // Points along rays and the code's values there, voxels.
-    static constexpr int kLooks = 64;
-    struct Looks {
-        alignas(64) float x[kLooks], y[kLooks], z[kLooks], d[kLooks];
-    };
-    struct Target {
-        int ray;
+    // A brick that rays look at, and those rays: first the one that came last; -1: none.
+    struct Brick {
+        ivec3 cell;
         uint32_t slot;
-        int next;  // of the same brick; -1: none
-        float from, to;
+        std::span<const sdf::Instruction> code;
+        int passed_by, hit_by;
     };
 
-    void collect(int ray, uint32_t slot, float from, float to);
-    template <int kMost, typename Fn>
-    void each_brick(Fn&& fn);
-    void search(uint32_t slot, std::span<const Target*> passes);
-    void polish(uint32_t slot, std::span<const Target*> found);
-    void place(int ray, float t);
-    void look(size_t to, int ray, float t);
-    void evaluate(uint32_t slot);
+    int brick_at(ivec3 cell);
+    void search(const Brick& brick);
+    void polish(const Brick& brick);
+    void polish_all(const Brick& brick, int count);
+    std::array<float, 3> in_brick(const Brick& brick, int ray, float t) const;
+    void evaluate(const Brick& brick, int count);
 
     const Field& field_;
-    const WideRays& rays_;
-    std::span<MarchHit> hits_;
     sdf::Isa isa_;
-    Looks looks_{};
-    std::vector<Target> targets_;
-    std::vector<int> firsts_;  // of targets_, one a brick
+
+    // Of the block at hand:
+    const WideRays* rays_ = nullptr;
+    std::span<MarchHit> hits_;
+    std::span<const RayNote> notes_;
+    static constexpr int kMostBricks = 2 * kMostRays;
+    std::array<Brick, kMostBricks> bricks_;
+    int brick_count_ = 0, last_ = 0;
+    static constexpr int kRemembered = 256;
+    std::array<int16_t, kRemembered> remembered_;  // bricks by a hash of the cell; -1: none
+    // The next ray that passed by, or hit, the same brick. A hit that the search found: where, and how values fall there.
+    std::array<int16_t, kMostRays> next_passed_, next_hit_;
+    struct Found {
+        bool yes;
+        float slope;
+        std::array<float, 3> in_brick;
+    };
+    std::array<Found, kMostRays> found_;
+
+    RayPolish polish_;
+    std::array<int, RayPolish::kMost> polished_;
+
+    // Points and the code's values there, metres.
+    static constexpr int kLooks = 64;
+    struct Looks {
+        alignas(64) std::array<float, kLooks> x{}, y{}, z{}, d{};
+    } looks_;
 };
 
 }  // namespace kiln::field

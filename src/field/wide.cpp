@@ -54,12 +54,28 @@ void wide_distances(const WideView& view, const sdf::Points& points, float* out,
     run(view, points, out);
 }
 
-void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes, sdf::Isa isa) {
+#define KILN_CHOOSE_WIDE(isa, name)               \
+    (isa == sdf::Isa::Avx512 ? &wide_avx512::name \
+     : isa == sdf::Isa::Avx2 ? &wide_avx2::name   \
+     : isa == sdf::Isa::Sse4 ? &wide_sse4::name   \
+                             : &wide_scalar::name)
+
+void wide_polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z, sdf::Isa isa) {
+    KILN_CHOOSE_WIDE(isa, polish_looks)(rays, count, x, y, z);
+}
+
+int wide_polish_steps(RayPolish& rays, int count, const float* metres, sdf::Isa isa) {
+    return KILN_CHOOSE_WIDE(isa, polish_steps)(rays, count, metres);
+}
+
+void wide_polish_places(RayPolish& rays, int count, sdf::Isa isa) { KILN_CHOOSE_WIDE(isa, polish_places)(rays, count); }
+
+void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa) {
     const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512_rays::march
                      : isa == sdf::Isa::Avx2 ? &wide_avx2::march
                      : isa == sdf::Isa::Sse4 ? &wide_sse4::march
                                              : &wide_scalar::march;
-    run(view, rays, count, hits, passes);
+    run(view, rays, count, hits, notes);
 }
 
 }  // namespace kiln::field

@@ -49,21 +49,46 @@ struct WideRays {
     const float* t_max;
 };
 
-/// Where a ray came nearest to what it did not meet: of the voxels with a solid corner that it left again, its value rising, the one whose
-/// values along the ray have the least lower bound.
-struct NearPass {
+/// What a march saw of a ray beside its hit.
+struct RayNote {
+    // Where it came nearest to what it did not meet: of the voxels with a solid corner that it left again, its value rising, the one whose
+    // values along the ray have the least lower bound.
     float least;     ///< that bound, voxels; kNearPassVoxels: there is none below it
     float from, to;  ///< the voxel's stretch of the ray
     ivec3 cell;      ///< world cell
+    float slope;     ///< of a kMarchHit's value there, along the ray
 };
 inline constexpr float kNearPassVoxels = 0.5f;
+
+/// Rays that are moved to where code has the surface, all of one brick, counted from where they met that of the texels; voxels.
+struct RayPolish {
+    static constexpr int kMost = 64;
+    enum : int32_t { kIdle, kOpen, kDone };
+    static constexpr float kStepBack = 0.125f;  ///< of a ray that does not enter the solid where it is
+
+    float voxel_size;                                              ///< metres
+    float base[3];                                                 ///< the brick's first texel
+    int round;                                                     ///< looks before
+    alignas(64) float first[3][kMost], along[3][kMost];            // from `base`; direction
+    alignas(64) float t[kMost], t_before[kMost], d_before[kMost];  // of the next look, and the last one with its value
+    alignas(64) float slope[kMost];                                // before the first look
+    alignas(64) int32_t state[kMost];
+    alignas(64) int32_t voxel[3][kMost];  // where t is, as in MarchHit
+    alignas(64) float p[3][kMost];
+};
+/// Where the next looks are, metres. `count` is a multiple of 16.
+void wide_polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z, sdf::Isa isa);
+/// What follows from what they saw (metres): how many are to look again. Those done are at t, idle ones stay where they were.
+int wide_polish_steps(RayPolish& rays, int count, const float* metres, sdf::Isa isa);
+/// Fills in voxel and p.
+void wide_polish_places(RayPolish& rays, int count, sdf::Isa isa);
 
 /// out[i] = distance at point i, metres. See HostBricks::distances().
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa);
 /// The same for one point.
 float wide_distance(const WideView& view, vec3 p, sdf::Isa isa);
 /// hits[i] = field_march(ray i, 0, t_max), but for `slot` (whether there is one: the caller knows it from the cell) and the counters
-/// `cells` and `voxels`, which stay 0. passes[i]: ray i's, where asked for.
-void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes, sdf::Isa isa);
+/// `cells` and `voxels`, which stay 0. notes[i]: ray i's, where asked for.
+void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa);
 
 }  // namespace kiln::field

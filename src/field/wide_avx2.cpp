@@ -59,6 +59,8 @@ static inline I gather_from(const Pointers& p) {
 
 #include "field/wide_one.inl"
 
+#include "field/wide_polish.inl"
+
 #include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_avx2

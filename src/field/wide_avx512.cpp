@@ -61,4 +61,6 @@ static inline void values_of(Words codes, F& a, F& b) {
 
 #include "field/wide_one.inl"
 
+#include "field/wide_polish.inl"
+
 }  // namespace kiln::field::wide_avx512

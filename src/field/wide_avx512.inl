@@ -14,8 +14,16 @@ static inline M le(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_LE_OQ)
 static inline M eq(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_EQ_OQ); }
 static inline M lt(I a, I b) { return _mm512_cmplt_epi32_mask(i(a), i(b)); }
 static inline M eq(I a, I b) { return _mm512_cmpeq_epi32_mask(i(a), i(b)); }
-static inline F select(M m, F a, F b) { return (F)_mm512_mask_blend_ps(m, f(b), f(a)); }
-static inline I select(M m, I a, I b) { return (I)_mm512_mask_blend_epi32(m, i(b), i(a)); }
+static inline F select(M m, F a, F b) {
+    __m512 out = _mm512_mask_blend_ps(m, f(b), f(a));
+    asm("" : "+v"(out));
+    return (F)out;
+}
+static inline I select(M m, I a, I b) {
+    __m512i out = _mm512_mask_blend_epi32(m, i(b), i(a));
+    asm("" : "+v"(out));
+    return (I)out;
+}
 static inline M all() { return M(0xffff); }
 static inline M none() { return M(0); }
 static inline bool any(M m) { return m != 0; }
@@ -29,6 +37,9 @@ static inline F sqrt(F a) { return (F)_mm512_sqrt_ps(f(a)); }
 static inline I gather_bytes(const void* base, I index) { return (I)_mm512_i32gather_epi32(i(index), base, 1); }
 static inline int count(M m) { return __builtin_popcount(m); }
 static inline uint32_t bits(M m) { return m; }
+static inline M mask_of(uint32_t bits) { return M(bits); }
+static inline F expand(M m, F others, const float* from) { return (F)_mm512_mask_expandloadu_ps(f(others), m, from); }
+static inline I expand(M m, I others, const int32_t* from) { return (I)_mm512_mask_expandloadu_epi32(i(others), m, from); }
 
 struct Pointers {
     __m512i low, high;  // of the first and the last eight lanes

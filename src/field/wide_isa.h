@@ -10,11 +10,14 @@
 #include <bit>
 #include <cstring>
 
-#define KILN_DECLARE_WIDE(name)                                                                          \
-    namespace kiln::field::name {                                                                        \
-    float distance(const WideView& view, vec3 p);                                                        \
-    void distances(const WideView& view, const sdf::Points& points, float* out);                         \
-    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes); \
+#define KILN_DECLARE_WIDE(name)                                                                        \
+    namespace kiln::field::name {                                                                      \
+    float distance(const WideView& view, vec3 p);                                                      \
+    void distances(const WideView& view, const sdf::Points& points, float* out);                       \
+    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes); \
+    void polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z);                 \
+    int polish_steps(RayPolish& rays, int count, const float* metres);                                 \
+    void polish_places(RayPolish& rays, int count);                                                    \
     }
 KILN_DECLARE_WIDE(wide_scalar)
 KILN_DECLARE_WIDE(wide_sse4)

@@ -15,3 +15,17 @@ static inline M none() { return I{}; }
 static inline M both(M a, M b) { return a & b; }
 static inline M either(M a, M b) { return a | b; }
 static inline M without(M a, M b) { return a & ~b; }
+
+static inline M mask_of(uint32_t bits) {
+    M lanes{};
+    for (int lane = 0; lane < kLanes; ++lane) lanes[lane] = 1 << lane;
+    return (lanes & int32_t(bits)) != 0;
+}
+// Lanes of m take one element after another.
+template <typename V, typename T>
+static inline V expand(M m, V others, const T* from) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+        if (m[lane] != 0) others[lane] = *from++;
+    }
+    return others;
+}

@@ -36,7 +36,8 @@ static inline F slope_of(const WideCubic& c, F s) {
     return 3.0f * ((c.b1 - c.b0) * r * r + 2.0f * (c.b2 - c.b1) * r * s + (c.b3 - c.b2) * s * s);
 }
 
-static inline F bracketed(const WideCubic& c, M active, F lo, F hi, F value_lo, F value_hi) {
+// `enough`: a step this short is the last one.
+static inline F bracketed(const WideCubic& c, M active, F lo, F hi, F value_lo, F value_hi, float enough) {
     F s = lo + (hi - lo) * (value_lo / (value_lo - value_hi));
     for (int i = 0; i < 24 && any(active); ++i) {
         const F value = value_of(c, s);
@@ -48,12 +49,12 @@ static inline F bracketed(const WideCubic& c, M active, F lo, F hi, F value_lo, 
         next = select(both(le(lo, next), le(next, hi)), next, 0.5f * (lo + hi));
         const F moved = abs(next - s);
         s = select(active, next, s);
-        active = without(active, lt(moved, number(1e-6f)));
+        active = without(active, lt(moved, number(enough)));
     }
     return s;
 }
 
-static inline F first_root(const WideCubic& c, M active) {
+static inline F first_root(const WideCubic& c, M active, float enough) {
     const F one = number(1), zero = number(0);
     const M start = le(c.b0, zero);
     F root = select(start, zero, number(kNoRoot));
@@ -82,7 +83,7 @@ static inline F first_root(const WideCubic& c, M active) {
     const F hi = select(in_first, first, select(in_second, second, one));
     const F value_lo = select(in_first, c.b0, select(in_second, value_first, value_second));
     const F value_hi = select(in_first, value_first, select(in_second, value_second, c.b3));
-    return select(found, bracketed(c, found, lo, hi, value_lo, value_hi), root);
+    return select(found, bracketed(c, found, lo, hi, value_lo, value_hi, enough), root);
 }
 
 static inline F leading(F a) { return floats_of(bits_of(a) & int32_t(0xfffff000)); }
@@ -92,6 +93,14 @@ static inline F crossing(F plane, F high, F low, F inverse, M flat, float parall
 static inline F texel_crossing(I texel, I whole, F part, F inverse, M flat, float parallel) {
     return select(flat, number(parallel), (to_float(texel - whole) - part) * inverse);
 }
+
+struct Counting {
+    int32_t of[kLanes];
+    constexpr Counting() : of() {
+        for (int i = 0; i < kLanes; ++i) of[i] = i;
+    }
+};
+constexpr Counting kCounting;
 
 // Rays of one packet, texels counted from the grid's first.
 struct Packet {
@@ -178,7 +187,7 @@ struct Marching {
     const WideRays& list;
     const int total;
     MarchHit* const hits;
-    NearPass* const passes;
+    RayNote* const notes;
     int next = 0;
 
     // By lane:
@@ -230,27 +239,20 @@ struct Marching {
     // Gives the next rays to free lanes.
     void take() {
         const M free = without(all(), either(either(either(looking, testing), entering), either(walking, solving)));
-        int32_t whole[3][kLanes] = {}, order[kLanes] = {}, taken[kLanes] = {};
-        float part[3][kLanes] = {}, direction[3][kLanes] = {}, far[kLanes] = {};
-        for (uint32_t left = bits(free); left != 0 && next < total; left &= left - 1, ++next) {
-            const int lane = __builtin_ctz(left);
-            for (int axis = 0; axis < 3; ++axis) {
-                whole[axis][lane] = list.whole[axis][next];
-                part[axis][lane] = list.part[axis][next];
-                direction[axis][lane] = list.direction[axis][next];
-            }
-            far[lane] = list.t_max[next];
-            order[lane] = next;
-            taken[lane] = -1;
-        }
-        const M fresh = lt(load(taken), splat(0));
+        uint32_t lanes = bits(free);
+        int taken = __builtin_popcount(lanes);
+        for (; taken > total - next; --taken) lanes &= lanes - 1;
+        const M fresh = mask_of(lanes);
+        const auto rays = [&](const auto* from, auto others) { return expand(fresh, others, from + next); };
         const auto component = [](F d) { return select(lt(abs(d), number(1e-12f)), number(0), d); };
         const auto inverse = [](F d) { return select(eq(d, number(0)), number(0), 1.0f / d); };
         Packet p;
-        p.whole = {load(whole[0]) - view.grid.cell_x * kBrickVoxels, load(whole[1]) - view.grid.cell_y * kBrickVoxels,
-                   load(whole[2]) - view.grid.cell_z * kBrickVoxels};
-        p.part = {load(part[0]), load(part[1]), load(part[2])};
-        p.direction = {component(load(direction[0])), component(load(direction[1])), component(load(direction[2]))};
+        p.whole = {rays(list.whole[0], splat(0)) - view.grid.cell_x * kBrickVoxels,
+                   rays(list.whole[1], splat(0)) - view.grid.cell_y * kBrickVoxels,
+                   rays(list.whole[2], splat(0)) - view.grid.cell_z * kBrickVoxels};
+        p.part = {rays(list.part[0], number(0)), rays(list.part[1], number(0)), rays(list.part[2], number(0))};
+        p.direction = {component(rays(list.direction[0], number(0))), component(rays(list.direction[1], number(0))),
+                       component(rays(list.direction[2], number(0)))};
         p.inverse = {inverse(p.direction.x), inverse(p.direction.y), inverse(p.direction.z)};
         p.flat_x = eq(p.inverse.x, number(0));
         p.flat_y = eq(p.inverse.y, number(0));
@@ -261,8 +263,9 @@ struct Marching {
         const auto bit = [](M up, int octant) { return select(up, splat(way_shift(octant)), splat(0)); };
         p.octant = bit(p.up_x, 1) + bit(p.up_y, 2) + bit(p.up_z, 4);
         packet = select(fresh, p, packet);
-        number_in_list = select(fresh, load(order), number_in_list);
-        t_max = select(fresh, load(far), t_max);
+        number_in_list = select(fresh, expand(fresh, splat(0), kCounting.of) + next, number_in_list);
+        t_max = rays(list.t_max, t_max);
+        next += taken;
 
         // Into the grid.
         const GridParams& g = view.grid;
@@ -345,6 +348,12 @@ struct Marching {
         looking = either(looking, m);
     }
 
+    // cell_word_index().
+    I cell_word_index_of(I3 c) const {
+        const I page = ((c.z >> 3) * view.pages_y + (c.y >> 3)) * view.pages_x + (c.x >> 3);
+        return (page << 9) + ((c.z & 7) << 6) + ((c.y & 7) << 3) + (c.x & 7);
+    }
+
     I box_corner(int shift) const { return (box >> shift) & 7; }
 
     // Rays that pass by the box of all voxels with a solid corner go on, the others enter the brick. Positions are rounded, so boxes are taken
@@ -372,10 +381,9 @@ struct Marching {
     void enter_bricks() {
         const M m = entering;
         entering = none();
-        Lanes x(cell.x), y(cell.y), z(cell.z);
+        const Lanes index(cell_word_index_of(cell));
         each_lane(m, [&](int i) {
-            const int index = cell_word_index(x[i], y[i], z[i], view.pages_x, view.pages_y);
-            const WideEntry entry = (*view.pages[index / kPageWords])[size_t(index % kPageWords)];
+            const WideEntry entry = (*view.pages[index.of[i] / kPageWords])[size_t(index.of[i] % kPageWords)];
             bricks[i] = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
             __builtin_prefetch(bricks[i] - kSolidRowsBeforeCodes);
         });
@@ -473,10 +481,12 @@ struct Marching {
         F out_x, out_y, out_z;
         const F out_any = exits(out_x, out_y, out_z);
         const M here = without(walking, lt(past, out_any));
-        Lanes rows(voxel.z * 8 + voxel.y);
-        each_lane(here, [&](int i) { rows[i] = int32_t(bricks[i][rows[i] - kSolidRowsBeforeCodes]); });
-        const I row = rows.all();
-        const M found = both(here, eq((row >> (voxel.x & 7)) & 1, splat(1)));
+        const Lanes rows(voxel.z * 8 + voxel.y), columns(voxel.x & 7);
+        uint32_t solid = 0;
+        each_lane(here, [&](int i) {
+            solid |= (uint32_t(bricks[i][rows.of[i] - kSolidRowsBeforeCodes]) >> columns.of[i] & 1) << i;
+        });
+        const M found = mask_of(solid);
         solving = either(solving, found);
         const M still = step_voxels(without(here, found), out_any, out_x, out_y);
         go_on(without(without(walking, found), still));
@@ -516,18 +526,20 @@ struct Marching {
         const F exit = max(min(out_any, leave), enter);
         const WideCorners corners = corners_of(m);
         const WideCubic cubic = cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit));
-        const F root = first_root(cubic, m);
+        // Newton's steps: after one of a thousandth, what is left is a rounding. Whoever asks for notes moves the hit anyway.
+        const F root = first_root(cubic, m, notes != nullptr ? 1e-3f : 1e-6f);
         const M hit = both(m, le(root, number(1)));
-        if (passes != nullptr) {
+        if (notes != nullptr) {
             const F least = min(min(cubic.b0, cubic.b1), min(cubic.b2, cubic.b3));
             const M near = both(without(m, hit), both(lt(least, number(kNearPassVoxels)), le(cubic.b2, cubic.b3)));
-            if (any(near)) note(near, least, ray.t_base + enter, ray.t_base + exit);
+            if (any(near)) note_pass(near, least, ray.t_base + enter, ray.t_base + exit);
         }
         if (any(hit)) {
             const F s = enter + root * (exit - enter);
             const F3 p = point_in_voxel(ray, voxel, s);
             const auto unit = [](F v) { return min(max(v, number(0)), number(1)); };
             write(hit, kMarchHit, ray.t_base + s, voxel, {unit(p.x), unit(p.y), unit(p.z)});
+            if (notes != nullptr) note_slope(hit, slope_of(cubic, root) / max(exit - enter, number(1e-6f)));
         }
         const M missed = without(m, hit);
         const M still = step_voxels(missed, out_any, out_x, out_y);
@@ -535,7 +547,7 @@ struct Marching {
         go_on(without(missed, still));
     }
 
-    void note(M m, F least, F from, F to) const {
+    void note_pass(M m, F least, F from, F to) const {
         struct {
             int32_t number[kLanes], cell[3][kLanes];
             float least[kLanes], from[kLanes], to[kLanes];
@@ -546,13 +558,16 @@ struct Marching {
         store(lanes.least, least), store(lanes.from, from), store(lanes.to, to);
         const GridParams& g = view.grid;
         each_lane(m, [&](int i) {
-            NearPass& pass = passes[lanes.number[i]];
-            if (!(lanes.least[i] < pass.least)) return;
-            pass = {lanes.least[i],
-                    lanes.from[i],
-                    lanes.to[i],
-                    {lanes.cell[0][i] + g.cell_x, lanes.cell[1][i] + g.cell_y, lanes.cell[2][i] + g.cell_z}};
+            RayNote& note = notes[lanes.number[i]];
+            if (!(lanes.least[i] < note.least)) return;
+            note.least = lanes.least[i], note.from = lanes.from[i], note.to = lanes.to[i];
+            note.cell = {lanes.cell[0][i] + g.cell_x, lanes.cell[1][i] + g.cell_y, lanes.cell[2][i] + g.cell_z};
         });
+    }
+
+    void note_slope(M m, F slope) const {
+        Lanes order(number_in_list), slopes(bits_of(slope));
+        each_lane(m, [&](int i) { notes[order[i]].slope = std::bit_cast<float>(slopes[i]); });
     }
 
     void write(M m, int state, F at, I3 in_voxel, F3 p) const {
@@ -580,18 +595,18 @@ struct Marching {
     }
 };
 
-void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, NearPass* passes) {
-    for (int i = 0; passes != nullptr && i < count; ++i) passes[i].least = kNearPassVoxels;
+void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes) {
+    for (int i = 0; notes != nullptr && i < count; ++i) notes[i].least = kNearPassVoxels;
+    MarchHit miss{};
+    miss.state = kMarchMiss;
+    miss.slot = -1;
     for (int i = 0; i < count; ++i) {
-        MarchHit miss{};
-        miss.state = kMarchMiss;
-        miss.t = rays.t_max[i];
-        miss.slot = -1;
-        hits[i] = miss;
+        std::memcpy(hits + i, &miss, sizeof miss);  // whole: member by member is four times as many stores
+        hits[i].t = rays.t_max[i];
     }
     if (view.texel_bytes == 2) {
-        Marching<true>{view, rays, count, hits, passes}.run();
+        Marching<true>{view, rays, count, hits, notes}.run();
     } else {
-        Marching<false>{view, rays, count, hits, passes}.run();
+        Marching<false>{view, rays, count, hits, notes}.run();
     }
 }

@@ -70,6 +70,13 @@ static inline M either(M x, M y) { return {one::either(x.a, y.a), one::either(x.
 static inline M without(M x, M y) { return {one::without(x.a, y.a), one::without(x.b, y.b)}; }
 static inline bool any(M m) { return (m.a | m.b) != 0; }
 static inline uint32_t bits(M m) { return uint32_t(m.a) | uint32_t(m.b) << one::kLanes; }
+static inline M mask_of(uint32_t bits) { return {one::mask_of(bits & 0xffff), one::mask_of(bits >> one::kLanes)}; }
+static inline F expand(M m, F others, const float* from) {
+    return {one::expand(m.a, others.a, from), one::expand(m.b, others.b, from + one::count(m.a))};
+}
+static inline I expand(M m, I others, const int32_t* from) {
+    return {one::expand(m.a, others.a, from), one::expand(m.b, others.b, from + one::count(m.a))};
+}
 static inline int count(M m) { return __builtin_popcount(bits(m)); }
 static inline F min(F x, F y) { return {one::min(x.a, y.a), one::min(x.b, y.b)}; }
 static inline F max(F x, F y) { return {one::max(x.a, y.a), one::max(x.b, y.b)}; }

@@ -29,6 +29,8 @@ static inline F floor(F a) {
 
 #include "field/wide_one.inl"
 
+#include "field/wide_polish.inl"
+
 #include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_scalar

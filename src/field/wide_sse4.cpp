@@ -25,6 +25,8 @@ static inline F floor(F a) { return (F)_mm_floor_ps((__m128)a); }
 
 #include "field/wide_one.inl"
 
+#include "field/wide_polish.inl"
+
 #include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_sse4

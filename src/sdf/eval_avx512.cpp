@@ -29,6 +29,16 @@ static inline real load(const float* from) {
 static inline void store(float* to, real v) { __builtin_memcpy(to, &v.v, sizeof v.v); }
 
 #include "sdf/eval_lanes.inl"
+
+#define KILN_FEW
+namespace few {  // the same on sixteen points
+#undef KILN_VECTORS
+#define KILN_VECTORS (16 / KILN_LANES)
+#include "sdf/eval_lanes.inl"
+#undef KILN_VECTORS
+#define KILN_VECTORS (64 / KILN_LANES)
+}  // namespace few
+
 #include "sdf/eval_entry.inl"
 
 static inline uint32_t lane_bits(mask m) { return uint32_t(_mm512_movepi32_mask(__m512i(m.v))); }

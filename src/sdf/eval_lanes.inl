@@ -2,13 +2,16 @@
 // The tape interpreter for one lane type. Included once per instruction set, inside its own namespace, after the shape language and
 // the generated texts. Works instruction by instruction on a chunk of points, so that decoding costs nothing.
 // Uses no standard-library templates: what a wide instruction set compiles here must not be shared with other files.
-// KILN_VECTORS: vectors in a chunk. load(), store() and real are the including file's.
+// KILN_VECTORS: vectors in a chunk. load(), store() and real are the including file's. Included a second time, with KILN_FEW, it is the
+// interpreter of distances alone for chunks of another size.
 
 #include "sdf/expression.inl"
 
+#ifndef KILN_FEW
 struct MixChunk {
     Mix v[KILN_VECTORS];
 };
+#endif
 
 struct Registers {
     Chunk cell[3];             // C
@@ -25,6 +28,7 @@ static inline void set_point(Chunk* p, int i, real3 q) {
 }
 static inline param3 param3_at(const float* w) { return param3(param(w[0]), param(w[1]), param(w[2])); }
 
+#ifndef KILN_FEW
 // Row-major 3x3 matrix times (p - t); w = t[3] M[9].
 static inline real3 affine(real3 p, const float* w) {
     const real3 q = p - param3_at(w);
@@ -39,6 +43,10 @@ static inline real box_distance(real3 p, param3 lo, param3 hi) {
     const real3 q = max(real3(lo) - p, p - real3(hi));
     return length(max(q, real3(zero, zero, zero))) + min(max(q.x, max(q.y, q.z)), zero);
 }
+
+// The distance a formula or a user's shape stands for: nothing where it is no number.
+static inline real cleaned(real v) { return select(lt(abs(v), real(param(kEmpty))), v, real(param(kEmpty))); }
+#endif
 
 // One step of a formula. An operand may be the instruction's own number.
 static void formula_step(Registers& r, uint32_t word, const float* w) {
@@ -63,9 +71,6 @@ static void formula_step(Registers& r, uint32_t word, const float* w) {
     }
     arithmetic(dst, *a, *b, fn);
 }
-
-// The distance a formula or a user's shape stands for: nothing where it is no number.
-static inline real cleaned(real v) { return select(lt(abs(v), real(param(kEmpty))), v, real(param(kEmpty))); }
 
 // A user's function sees doubles, so that one function serves every lane type, exact answers among them.
 static void custom_step(Chunk& dst, const Chunk* point, uint32_t index, const float* w) {
@@ -135,6 +140,24 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
     }
 }
 
+#ifdef KILN_FEW
+// A ball or a box at C - t, where `code` is one.
+static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const float* params, const float* t) {
+    const uint32_t word = code[0], shape = (word >> 5) & 255u;
+    if (Opcode(word & 31u) != Opcode::Shape || (shape != kFusedSphere && shape != kFusedBox)) return false;
+    const float* w = params + code[1];
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    for (int i = 0; i < KILN_VECTORS; ++i) {
+        const real3 p = point_at(r.cell, i) - param3_at(t);
+        set_point(r.point, i, p);
+        dst.v[i] = (shape == kFusedSphere ? shape_distance(kFusedSphere, p, w + 3, Samples{nullptr})
+                                          : shape_distance(kFusedBox, p, w + 3, Samples{nullptr})) *
+                   param(w[0]);
+    }
+    return true;
+}
+#endif
+
 static void run_distance(Registers& r, const uint32_t* code, size_t count, const float* params, Samples samples) {
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
@@ -143,6 +166,12 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
         const Chunk& a = r.value[(word >> 18) & 31u];
         const Chunk& b = r.value[(word >> 23) & 31u];
         const uint32_t aux = (word >> 5) & 255u;
+#ifdef KILN_FEW  // points too few to hide the cost of decoding: most edits begin like this
+        if (Opcode(word & 31u) == Opcode::PointTranslate && pc + 1 < count && moved_ball_or_box(r, code + 2 * (pc + 1), params, w)) {
+            ++pc;
+            continue;
+        }
+#endif
         switch (Opcode(word & 31u)) {
             case Opcode::Combine: {
                 const param k = param(w[0]);
@@ -182,6 +211,7 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
     }
 }
 
+#ifndef KILN_FEW
 // slot 1: materials, slot 2: edits (words of a Shape's parameters).
 [[maybe_unused]] static void run_materials(Registers& r, MixChunk* mix, const uint32_t* code, size_t count, const float* params, Samples samples,
                           int slot) {
@@ -247,3 +277,4 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
         }
     }
 }
+#endif

@@ -4,7 +4,9 @@
 // (rounding is monotonic, so float results lie between the rounded ends; one more step outward covers double). An end that is not
 // finite says that nothing is known, NaN included.
 
+#ifndef KILN_FEW  // see eval_lanes.inl
 #include "sdf/expression_fn.sdf.h"
+#endif
 
 struct Chunk {
     real v[KILN_VECTORS];
@@ -75,6 +77,7 @@ static __attribute__((noinline)) void arithmetic(Chunk& out, const Chunk& a, con
     }
 }
 
+#ifndef KILN_FEW
 struct Range {
     real lo, hi;
 };
@@ -195,3 +198,4 @@ KILN_SDF Winner2 winner_of(Range a, Range b, bool least) {
     if (operands(fn) == 2) known = both(known, is_finite(b));
     return {select(known, out.lo, -infinite()), select(known, out.hi, infinite())};
 }
+#endif  // KILN_FEW

@@ -271,7 +271,8 @@ private:
 
 }  // namespace
 
-std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& view, Isa isa, FormulaImageStats* stats) {
+std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& view, Isa isa, FormulaImageStats* stats,
+                                   int workers) {
     std::vector<uint8_t> pixels(size_t(view.size_px) * size_t(view.size_px));
     const Code code = code_of(formula);
     // A power of four times the smallest tile; what lies outside the picture is left out.
@@ -294,7 +295,7 @@ std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& vi
         });
         sum = first.stats;
         std::vector<FormulaImageStats> each(tiles.size());
-        parallel_for(tiles.size(), [&](int i) {
+        parallel_for(tiles.size(), workers, [&](int i) {
             Painter painter(view, isa, pixels);
             const Tile& tile = tiles[size_t(i)];
             painter.paint(tile.code, tile.left, tile.top, tile.side, 0);
@@ -310,11 +311,11 @@ std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& vi
     return pixels;
 }
 
-std::vector<uint8_t> formula_image_slow(const Formula& formula, const FormulaView& view, Isa isa) {
+std::vector<uint8_t> formula_image_slow(const Formula& formula, const FormulaView& view, Isa isa, int workers) {
     std::vector<uint8_t> pixels(size_t(view.size_px) * size_t(view.size_px));
     const Code code = code_of(formula);
     const int rows = (view.size_px + kBlock - 1) / kBlock;
-    parallel_for(size_t(rows), [&](int row) {
+    parallel_for(size_t(rows), workers, [&](int row) {
         Painter painter(view, isa, pixels);
         for (int left = 0; left < view.size_px; left += kBlock) painter.points(code, left, row * kBlock, kBlock);
     });

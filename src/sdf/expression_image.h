@@ -23,10 +23,11 @@ struct FormulaImageStats {
     uint64_t copied_operations = 0;    ///< looked at to shorten code
 };
 
-/// 255 where the formula is below 0, else 0; row by row from the top. On as many threads as parallel_for has.
+/// 255 where the formula is below 0, else 0; row by row from the top. `workers`: threads, 0 for all cores.
 std::vector<uint8_t> formula_image(const Formula& formula, const FormulaView& view, Isa isa = best_isa(),
-                                   FormulaImageStats* stats = nullptr);
+                                   FormulaImageStats* stats = nullptr, int workers = 0);
 /// The same, every operation at every pixel.
-std::vector<uint8_t> formula_image_slow(const Formula& formula, const FormulaView& view, Isa isa = best_isa());
+std::vector<uint8_t> formula_image_slow(const Formula& formula, const FormulaView& view, Isa isa = best_isa(),
+                                        int workers = 0);
 
 }  // namespace kiln::sdf

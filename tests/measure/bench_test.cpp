@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: MIT
 // Benchmarks do the work they say: the scenes are those of the recipe, and every row's result is the slow way's.
 #include "measure/bench_run.h"
+#include "measure/letters.h"
 #include "measure/recipes.h"
 #include "measure/slow.h"
 
 #include "sdf/eval.h"
+#include "sdf/expression.h"
 #include "sdf/program.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace kiln::measure {
@@ -40,6 +43,12 @@ TEST(Recipes, AreThePublishedScenes) {
     EXPECT_NEAR(distance_at(recipe(0, 5, 100), {0, 0, 0}), 0.133487, 1e-6);
 }
 
+TEST(Recipes, TheLettersAreAsManyOperationsAsThePublicModel) {
+    const std::string text = letters_model(224, true, 5);
+    EXPECT_EQ(std::ranges::count(text, '\n'), 1 + 7866);  // a comment before them
+    EXPECT_TRUE(sdf::read_vm(text));
+}
+
 BenchOptions small(std::vector<int> kinds) {
     BenchOptions o;
     o.kinds = std::move(kinds);
@@ -49,6 +58,16 @@ BenchOptions small(std::vector<int> kinds) {
     o.runs = 1;
     o.threads = 1;
     return o;
+}
+
+TEST(Bench, ThePictureOfAFormulaIsBesideBruteForce) {
+    const std::vector<std::string> names{"expression"};
+    const auto report = run_bench(names, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_EQ(report->rows.size(), 1u);
+    EXPECT_EQ(report->rows[0].unit, "ms");
+    EXPECT_THAT(report->rows[0].peer, HasSubstr("every operation"));
+    EXPECT_FALSE(report->rows[0].checksum.empty());
 }
 
 TEST(Bench, EveryRowOfEveryKindEqualsTheSlowWay) {

@@ -7,7 +7,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <cstring>
+#include <numbers>
 
 namespace kiln::model {
 namespace {
@@ -194,6 +196,51 @@ TEST(Bake, PartsThatOverlapAreOneSolid) {
     expect_sign(s, mesh, "cross");
     // The inner walls are gone: from the middle the nearest surface is the front.
     for (const float x : {0.0f, 0.3f, -0.3f, 0.25f}) EXPECT_LT(s.distance({x, 0, 0}), -0.2) << x;
+}
+
+// One closed surface, each edge passed twice, that goes through itself: what lies in both arms is wound twice, and as solid as the rest.
+TEST(Bake, ATubeThatPassesThroughItselfIsSolidWhereItDoes) {
+    constexpr int kAlong = 160, kAround = 24;
+    constexpr double kRadius = 0.15, kTurn = 2 * std::numbers::pi;
+    const auto middle = [](double t) {
+        return dvec3{std::sin(t), std::sin(t) * std::cos(t), 0};
+    };  // Gerono's lemniscate
+    Triangles mesh;
+    for (uint32_t i = 0; i < kAlong; ++i) {
+        const double t = kTurn * (i + 0.5) / kAlong, x = std::cos(t), y = std::cos(2 * t), size = std::hypot(x, y);
+        const dvec3 c = middle(t);
+        for (uint32_t k = 0; k < kAround; ++k) {
+            const double u = kRadius * std::cos(kTurn * k / kAround), z = kRadius * std::sin(kTurn * k / kAround);
+            mesh.positions.push_back({float(c.x - u * y / size), float(c.y + u * x / size), float(z)});
+            const uint32_t a = i * kAround + k, b = i * kAround + (k + 1) % kAround;
+            const uint32_t c_next = (a + kAround) % (kAlong * kAround), d_next = (b + kAround) % (kAlong * kAround);
+            mesh.faces.push_back({a, c_next, b});
+            mesh.faces.push_back({b, c_next, d_next});
+        }
+    }
+    const Shape s = shape_of(mesh, {.resolution = 64});
+    EXPECT_TRUE(s.baked.report.topology.balanced);
+    EXPECT_TRUE(s.baked.report.overlapping);
+    EXPECT_THAT(s.baked.report.sentence(), testing::HasSubstr("overlap"));
+    Random random(12);
+    int inside = 0;
+    for (int i = 0; i < 2000; ++i) {
+        const vec3 p{random.in(-1.2f, 1.2f), random.in(-0.7f, 0.7f), random.in(-0.25f, 0.25f)};
+        double nearest = 10;
+        for (int k = 0; k < 1000; ++k) {
+            const dvec3 c = middle(kTurn * k / 1000);
+            nearest = std::min(nearest, std::hypot(double(p.x) - c.x, double(p.y) - c.y, double(p.z)));
+        }
+        const double distance = nearest - kRadius;
+        if (std::abs(distance) < 2 * double(s.cell())) continue;
+        EXPECT_EQ(s.value(p) <= 0, distance < 0) << p.x << ' ' << p.y << ' ' << p.z;
+        inside += distance < 0;
+    }
+    EXPECT_GT(inside, 100);
+    // The wall of one arm within the other is no surface.
+    const float wall = float(kRadius / std::numbers::sqrt2);
+    EXPECT_LT(s.distance({wall, wall, 0}), -0.1);
+    EXPECT_LT(s.distance({-wall, wall, 0}), -0.1);
 }
 
 TEST(Bake, AHollowKeepsItsHollow) {

@@ -2,8 +2,8 @@
 // Pictures of plane models against every operation at every pixel.
 
 #include "formulas.h"
-#include "model_text.h"
 
+#include "measure/letters.h"
 #include "sdf/expression_image.h"
 
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace kiln::sdf {
 namespace {
 
 TEST(FormulaImage, HasTheBitsOfEveryOperationAtEveryPixel) {
-    const auto letters = read_vm(letters_model(60));
+    const auto letters = read_vm(measure::letters_model(60));
     ASSERT_TRUE(letters) << letters.error().message;
     std::vector<Formula> formulas{*letters};
     for (const char* text : {"1", "-1", "x", "y - 0.2", "length(p.xy) - 0.7", "max(x, -y) + z", "x/y",
@@ -48,7 +48,7 @@ TEST(FormulaImage, ShowsTheModelUpright) {
 }
 
 TEST(FormulaImage, LooksAtASmallShareOfALargeModel) {
-    const auto letters = read_vm(letters_model(200));
+    const auto letters = read_vm(measure::letters_model(200));
     ASSERT_TRUE(letters);
     FormulaImageStats stats;
     (void)formula_image(*letters, {.size_px = 1024}, best_isa(), &stats);
