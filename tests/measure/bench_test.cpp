@@ -103,7 +103,7 @@ TEST(Bench, FlyingDiggingAndMovingLeaveWhatABuildFromNothingHolds) {
     const std::vector<std::string> rows{"world/dig", "world/move.1000"};
     const auto report = run_bench(rows, small({0}));
     ASSERT_TRUE(report) << report.error().message;
-    ASSERT_EQ(report->rows.size(), 5u);
+    ASSERT_EQ(report->rows.size(), 6u);
     for (const BenchRow& row : report->rows) {
         EXPECT_GT(row.value, 0) << row.name;
         EXPECT_EQ(row.checksum.size(), 16u) << row.name;
