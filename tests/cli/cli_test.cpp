@@ -296,9 +296,9 @@ TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
 TEST_F(Cli, DemoListsScenes) {
     const Outcome o = run("demo --list");
     EXPECT_EQ(o.code, 0);
-    for (const char* name : {"archipelago", "orbit", "potter", "quarry", "workbench"})
+    for (const char* name : {"archipelago", "orbit", "potter", "quarry", "tumble", "workbench"})
         EXPECT_THAT(o.out, HasSubstr(name));
-    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 5);
+    EXPECT_EQ(std::count(o.out.begin(), o.out.end(), '\n'), 6);
 }
 
 TEST_F(Cli, APathIsASequenceAndLevelsFollowIt) {
