@@ -24,11 +24,7 @@ layout(push_constant) uniform Push { CascadeCullPush push; };
 shared uint low[2];  // of the cluster's box, as ordered bits
 shared uint high[2];
 
-uint ordered(float x) {
-    uint bits = floatBitsToUint(x);
-    return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
-}
-float of_ordered(uint key) { return uintBitsToFloat((key & 0x80000000u) != 0u ? key & 0x7fffffffu : ~key); }
+#include "render/passes/ordered_bits.glsl"
 
 void main() {
     uint thread = gl_LocalInvocationIndex;
@@ -46,8 +42,8 @@ void main() {
         for (uint i = 0u; i < 3u; ++i) {
             vec3 at = cascade_place(cluster.part, vertex_position(mesh_corner(part, triangle, i)));
             for (int axis = 0; axis < 2; ++axis) {
-                atomicMin(low[axis], ordered(at[axis]));
-                atomicMax(high[axis], ordered(at[axis]));
+                atomicMin(low[axis], ordered_bits(at[axis]));
+                atomicMax(high[axis], ordered_bits(at[axis]));
             }
         }
     }
@@ -61,8 +57,8 @@ void main() {
         }
         if (is && thread < cascades.count) {
             vec3 square = cascades.casters[thread].xyz;
-            vec2 box_low = vec2(of_ordered(low[0]), of_ordered(low[1]));
-            vec2 box_high = vec2(of_ordered(high[0]), of_ordered(high[1]));
+            vec2 box_low = vec2(float_of_ordered(low[0]), float_of_ordered(low[1]));
+            vec2 box_high = vec2(float_of_ordered(high[0]), float_of_ordered(high[1]));
             if (all(lessThanEqual(box_low, square.xy + square.z)) && all(greaterThanEqual(box_high, square.xy - square.z))) {
                 uint place = atomicAdd(draws[draw + 1u], 1u);
                 drawn[thread * push.clusters + (holes == 0u ? place : push.solid + place)] = cluster;

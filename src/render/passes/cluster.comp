@@ -23,15 +23,10 @@ layout(set = 0, binding = 5, std430) writeonly buffer LightMasks { uint light_ma
 
 const uint kThreads = uint(kClusterSide * kClusterSide);
 
-shared uint low[3], high[3];  // ordered(): of the points' box
+shared uint low[3], high[3];  // ordered_bits(): of the points' box
 shared uint words[kThreads / 32u];
 
-// Unsigned integers in the order of floats, and back.
-uint ordered(float x) {
-    uint bits = floatBitsToUint(x);
-    return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
-}
-float disordered(uint key) { return uintBitsToFloat((key & 0x80000000u) != 0u ? key & 0x7fffffffu : ~key); }
+#include "render/passes/ordered_bits.glsl"
 
 // May the light's illuminance be above 0 somewhere in the box?
 bool reaches(LightRecord light, vec3 box_low, vec3 box_high) {
@@ -63,16 +58,16 @@ void main() {
         if ((seen.y >> 28u) != kSeenNothing) {
             vec3 p_world = seen_point(pixel_ray(pixel), seen);
             for (int axis = 0; axis < 3; ++axis) {
-                atomicMin(low[axis], ordered(p_world[axis]));
-                atomicMax(high[axis], ordered(p_world[axis]));
+                atomicMin(low[axis], ordered_bits(p_world[axis]));
+                atomicMax(high[axis], ordered_bits(p_world[axis]));
             }
         }
     }
     barrier();
     bool all = (frame.flags & kFrameAllLights) != 0u;
     bool any = all || low[0] <= high[0];
-    vec3 box_low = vec3(disordered(low[0]), disordered(low[1]), disordered(low[2]));
-    vec3 box_high = vec3(disordered(high[0]), disordered(high[1]), disordered(high[2]));
+    vec3 box_low = vec3(float_of_ordered(low[0]), float_of_ordered(low[1]), float_of_ordered(low[2]));
+    vec3 box_high = vec3(float_of_ordered(high[0]), float_of_ordered(high[1]), float_of_ordered(high[2]));
     // Other kernels may round the same point otherwise.
     vec3 slack = 1e-6 * max(abs(box_low), abs(box_high)) + 1e-6;
     box_low -= slack;

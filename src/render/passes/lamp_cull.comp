@@ -23,11 +23,7 @@ layout(push_constant) uniform Push { LampCullPush push; };
 shared uint low[3];  // of the cluster's box from the eye, as ordered bits
 shared uint high[3];
 
-uint ordered(float x) {
-    uint bits = floatBitsToUint(x);
-    return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
-}
-float of_ordered(uint key) { return uintBitsToFloat((key & 0x80000000u) != 0u ? key & 0x7fffffffu : ~key); }
+#include "render/passes/ordered_bits.glsl"
 
 // Is all of the box on the far side of a plane through the origin?
 bool beyond(vec3 middle, vec3 half_size, vec3 inwards) { return dot(middle, inwards) + dot(half_size, abs(inwards)) < 0.0; }
@@ -48,8 +44,8 @@ void main() {
         for (uint i = 0u; i < 3u; ++i) {
             vec3 p = mesh_point(part, vertex_position(mesh_corner(part, triangle, i)));
             for (int axis = 0; axis < 3; ++axis) {
-                atomicMin(low[axis], ordered(p[axis]));
-                atomicMax(high[axis], ordered(p[axis]));
+                atomicMin(low[axis], ordered_bits(p[axis]));
+                atomicMax(high[axis], ordered_bits(p[axis]));
             }
         }
     }
@@ -63,8 +59,8 @@ void main() {
     }
     if (!is) return;
     LampFace face = faces[thread];
-    vec3 box_low = vec3(of_ordered(low[0]), of_ordered(low[1]), of_ordered(low[2])) - face.at.xyz;
-    vec3 box_high = vec3(of_ordered(high[0]), of_ordered(high[1]), of_ordered(high[2])) - face.at.xyz;
+    vec3 box_low = vec3(float_of_ordered(low[0]), float_of_ordered(low[1]), float_of_ordered(low[2])) - face.at.xyz;
+    vec3 box_high = vec3(float_of_ordered(high[0]), float_of_ordered(high[1]), float_of_ordered(high[2])) - face.at.xyz;
     vec3 middle = 0.5 * (box_low + box_high);
     vec3 half_size = 0.5 * (box_high - box_low);
     // Five sides; what is farther than the range hides nothing that is lit. A little wider for rounding.

@@ -52,12 +52,7 @@ shared uint tile_open;                                    // some point may stil
 
 Reach tile_beam;
 
-// Unsigned integers in the order of floats, and back.
-uint ordered_bits(float x) {
-    uint bits = floatBitsToUint(x);
-    return (bits & 0x80000000u) != 0u ? ~bits : bits | 0x80000000u;
-}
-float float_of_ordered(uint key) { return uintBitsToFloat((key & 0x80000000u) != 0u ? key & 0x7fffffffu : ~key); }
+#include "render/passes/ordered_bits.glsl"
 
 // The points of the workgroup, and which lights they want.
 void bound_tile(bool lit, vec3 from, uvec4 fractions) {
