@@ -61,7 +61,7 @@ void EditIndex::refresh(Node& node) {
 
 void EditIndex::grow_to(vec3 p) {
     const float far = std::max({std::fabs(p.x), std::fabs(p.y), std::fabs(p.z)});
-    while (far > half_) {
+    while (far >= half_) {  // on the border it would be in another octant once the cube has grown
         if (root_ && root_->count > 0) {
             // Each old octant becomes the innermost octant of a new one.
             Node next;

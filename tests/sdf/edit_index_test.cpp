@@ -90,6 +90,30 @@ TEST(EditIndex, FindsWhatABruteSearchFindsAfterRandomChangesAndSnapshotsStay) {
     }
 }
 
+// Centres on the borders of octants, of the root's own cube too, before and after it grows.
+TEST(EditIndex, WhatLiesOnBordersOfOctantsIsFoundAgain) {
+    for (const float start : {1.0f, 16.0f}) {
+        EditIndex index;
+        std::map<uint32_t, IndexedEdit> all;
+        uint32_t row = 0;
+        for (float at = start; at <= 64 * start; at *= 2) {
+            for (const float sign : {1.0f, -1.0f}) {
+                for (uint32_t i = 0; i < 40; ++i, ++row) {
+                    IndexedEdit e;
+                    e.row = row;
+                    const float middle = sign * at, across = i % 2 == 0 ? middle : float(i) - 20;
+                    e.solid = {vec3{middle, across, across} - vec3{0.2f}, vec3{middle, across, across} + vec3{0.2f}};
+                    e.adds = true;
+                    all[row] = e;
+                    index.insert(e);
+                }
+            }
+        }
+        for (const auto& [number, e] : all) index.remove(e);
+        EXPECT_EQ(index.size(), 0u);
+    }
+}
+
 TEST(EditIndex, TheAllowanceIsForBlendsThatAreNearAndNoMoreThanSixRadii) {
     EditIndex index;
     const auto edit = [](uint32_t row, float at, float reach) {
