@@ -300,6 +300,9 @@ Result<void> GpuField::update(std::shared_ptr<const field::Field> next, Baker ba
     }
     std::sort(slots.begin(), slots.end());
     bricks_on_host_ = 0;
+    if (!same_atlas && slots.empty()) {
+        if (auto r = clear_atlas(); !r) return fail(r.error());
+    }
     if (baker == Baker::Host) {
         if (auto r = bake_on_host(slots); !r) return fail(r.error());
         return {};
@@ -367,6 +370,18 @@ Result<void> GpuField::fit_atlas(uint32_t slots, rhi::Format format, Baker baker
     return made;
 }
 
+// Of a world without bricks: kernels name the atlas, and what nothing has written cannot be named.
+Result<void> GpuField::clear_atlas() {
+    Graph graph(*runner_);
+    FieldHandles f = import(graph);
+    graph.clear(f.distances);
+    graph.clear(f.materials);
+    graph.output(f.distances, rhi::Access::SampledReadCompute);
+    graph.output(f.materials, rhi::Access::SampledReadCompute);
+    if (auto submit = runner_->execute(graph); !submit) return submit.error();
+    return {};
+}
+
 Result<void> GpuField::update(const field::Clipmap& next) {
     bricks_baked_ = bricks_on_host_ = 0;
     bake_ms_ = 0;
@@ -423,6 +438,9 @@ Result<void> GpuField::update(const field::Clipmap& next) {
                 continue;
         }
         slots.push_back(slot);
+    }
+    if (!same_atlas && slots.empty()) {
+        if (auto r = clear_atlas(); !r) return fail(r.error());
     }
     if (slots.empty()) return {};
     if (auto r = store_texels(slots, next.options().workers, [&](uint32_t slot) { return next.content(slot); }); !r)

@@ -125,6 +125,7 @@ private:
     template <typename Content>
     Result<void> store_texels(std::span<const uint32_t> slots, int workers, Content&& content);
     Result<void> store_programs(const AppendArray<float>* old_samples, const AppendArray<float>* old_params);
+    Result<void> clear_atlas();
     Result<void> fit_atlas(uint32_t slots, rhi::Format format, Baker baker);
     std::vector<sdf::Instruction> outside_code();
 
