@@ -45,14 +45,6 @@ function(kiln_shaders name)
             DEPFILE ${spv}.d
             COMMENT "Shader ${stem}"
             VERBATIM)
-        add_custom_command(
-            OUTPUT ${spv}.h
-            COMMAND ${CMAKE_COMMAND} -D IN=${spv} -D OUT=${spv}.h -D STEM=${stem} -P ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
-            DEPENDS ${spv} ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
-            VERBATIM)
-        list(APPEND headers ${spv}.h)
-        file(RELATIVE_PATH within ${PROJECT_SOURCE_DIR}/src ${shader})
-        string(APPEND list_includes "#include \"shaders/${stem}.spv.h\"\n")
         string(REPLACE "_" ";" parts ${stem})
         set(camel)
         foreach(part IN LISTS parts)
@@ -61,6 +53,14 @@ function(kiln_shaders name)
             string(TOUPPER ${letter} letter)
             string(APPEND camel ${letter}${rest})
         endforeach()
+        add_custom_command(
+            OUTPUT ${spv}.h
+            COMMAND ${CMAKE_COMMAND} -D IN=${spv} -D OUT=${spv}.h -D NAME=k${camel}Spv -P ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
+            DEPENDS ${spv} ${PROJECT_SOURCE_DIR}/cmake/embed_spirv.cmake
+            VERBATIM)
+        list(APPEND headers ${spv}.h)
+        file(RELATIVE_PATH within ${PROJECT_SOURCE_DIR}/src ${shader})
+        string(APPEND list_includes "#include \"shaders/${stem}.spv.h\"\n")
         string(APPEND list_rows "    {\"${within}\", k${camel}Spv},\n")
         set_property(GLOBAL APPEND PROPERTY KILN_SPIRV ${spv})
         # HLSL has ray-tracing stages, but spirv-cross does not write them.

@@ -126,7 +126,6 @@ Result<void> Simulation::change_ground() {
 
 Result<bool> Simulation::cut_loose(const field::LoosePart& part) {
     if (!region_fits(part.region.size)) return false;  // too wide for a region: it stays
-    const std::vector<Edit> all = edits_;
     std::vector<uint32_t> rows;
     const sdf::Program& program = ground_->program();
     program.index.find(box_of(part.region), kReachVoxels * voxel_size_, rows);
@@ -134,7 +133,7 @@ Result<bool> Simulation::cut_loose(const field::LoosePart& part) {
     for (const uint32_t row : rows) owners.push_back(program.edits[row].owner);
     std::sort(owners.begin(), owners.end());
     std::vector<const Edit*> near;
-    for (const uint32_t owner : owners) near.push_back(&all[owner]);
+    for (const uint32_t owner : owners) near.push_back(&edits_[owner]);
 
     std::string name;
     do name = formatted("part{}", ++parts_);

@@ -6,33 +6,19 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "simulated.h"
+
 #include <cmath>
 #include <string>
 
 using namespace kiln;
 using nlohmann::json;
+using scene::engines;
+using scene::parsed;
+using scene::run;
 using testing::HasSubstr;
 
 namespace {
-
-std::vector<std::string> engines() {
-    std::vector<std::string> out;
-    for (const PhysicsBackend& b : physics_backends())
-        if (b.why_not.empty()) out.emplace_back(b.name);
-    return out;
-}
-
-World parsed(const std::string& text) {
-    auto world = World::parse(text, "s.kiln.json");
-    EXPECT_TRUE(world) << (world ? "" : world.error().message);
-    return world ? std::move(*world) : World();
-}
-
-json run(const World& world, const SimulateSettings& settings) {
-    const auto text = world.simulate_json(settings);
-    EXPECT_TRUE(text) << (text ? "" : text.error().message);
-    return text ? json::parse(*text) : json();
-}
 
 const json& walker(const json& out, size_t frame) { return out["frames"][frame]["characters"][0]; }
 vec3 place(const json& character) {

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "simulated.h"
 #include "temp_folder.h"
 
 #include <cmath>
@@ -13,18 +14,13 @@
 #include <string>
 
 using namespace kiln;
+using scene::engines;
+using scene::parsed;
 using testing::HasSubstr;
 
 namespace {
 
 constexpr Camera kCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
-
-std::vector<std::string> engines() {
-    std::vector<std::string> out;
-    for (const PhysicsBackend& b : physics_backends())
-        if (b.why_not.empty()) out.emplace_back(b.name);
-    return out;
-}
 
 // A pillar with a painted belt and a smooth head, to be cut through below them.
 constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
@@ -38,12 +34,6 @@ constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
   "bodies": [{"id": "b", "edits": ["ball"]}]})";
 constexpr const char* kSlit =
     R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
-
-World parsed(const std::string& text) {
-    auto world = World::parse(text, "s.kiln.json");
-    EXPECT_TRUE(world) << (world ? "" : world.error().message);
-    return world ? std::move(*world) : World();
-}
 
 struct Played {
     World start = parsed(kPillar);

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "simulated.h"
 #include "temp_folder.h"
 
 #include <cmath>
@@ -19,18 +20,13 @@
 
 using namespace kiln;
 using nlohmann::json;
+using scene::engines;
+using scene::parsed;
 using testing::HasSubstr;
 
 namespace {
 
 constexpr Camera kCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
-
-std::vector<std::string> engines() {
-    std::vector<std::string> out;
-    for (const PhysicsBackend& b : physics_backends())
-        if (b.why_not.empty()) out.emplace_back(b.name);
-    return out;
-}
 
 constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.1},
   "edits": [
@@ -39,12 +35,6 @@ constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.1},
     {"id": "ball", "shape": "sphere", "radius": 0.3, "position": [0.2, 1.5, 0]},
     {"id": "crate", "shape": "box", "half_extents": [0.3, 0.3, 0.3], "position": [-1.5, 1, 0], "rotation": [0, 0, 0.1305262, 0.9914449]}],
   "bodies": [{"id": "b", "edits": ["ball"], "linear_velocity": [1, 0, 0]}, {"id": "c", "edits": ["crate"]}]})";
-
-World parsed(const std::string& text) {
-    auto world = World::parse(text, "s.kiln.json");
-    EXPECT_TRUE(world) << (world ? "" : world.error().message);
-    return world ? std::move(*world) : World();
-}
 
 Play started(const World& world, const std::string& engine) {
     auto play = Play::start(world, {.backend = engine});

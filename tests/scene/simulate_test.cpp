@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "simulated.h"
 #include "temp_folder.h"
 
 #include <cmath>
@@ -14,28 +15,12 @@
 
 using namespace kiln;
 using nlohmann::json;
+using scene::engines;
+using scene::parsed;
+using scene::run;
 using testing::HasSubstr;
 
 namespace {
-
-std::vector<std::string> engines() {
-    std::vector<std::string> out;
-    for (const PhysicsBackend& b : physics_backends())
-        if (b.why_not.empty()) out.emplace_back(b.name);
-    return out;
-}
-
-World parsed(const std::string& text) {
-    auto world = World::parse(text, "s.kiln.json");
-    EXPECT_TRUE(world) << (world ? "" : world.error().message);
-    return world ? std::move(*world) : World();
-}
-
-json run(const World& world, const SimulateSettings& settings) {
-    const auto text = world.simulate_json(settings);
-    EXPECT_TRUE(text) << (text ? "" : text.error().message);
-    return text ? json::parse(*text) : json();
-}
 
 std::string message(const std::string& text, const SimulateSettings& settings = {}) {
     auto world = World::parse(text, "s.kiln.json");

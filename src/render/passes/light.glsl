@@ -38,13 +38,12 @@ uint environment_word(uint i) { return environment_words[i]; }
 #include "render/lib/shading.gpu.h"
 #include "render/passes/rays.glsl"
 #include "render/passes/light_walk.glsl"
+#include "render/passes/brightest.glsl"
 #include "render/passes/surface.glsl"
 
 #ifdef KILN_GLASS
 #include "render/passes/glass_tint.glsl"
 #endif
-
-const float kBrightestStored = 65000.0;  // of a half
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);

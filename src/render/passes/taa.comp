@@ -22,10 +22,6 @@ layout(set = 0, binding = 7, rgba16f) writeonly uniform image2D smoothed;
 layout(push_constant) uniform Push { TaaPush push; };
 
 const float kMostFrames = 16.0;
-const float kDeviations = 1.25;      // of the neighbourhood that history may differ by
-const float kSameDepth = 0.005;      // share of the distance
-const float kFastest = 0.125;        // of the picture's height, a frame: nothing is kept of what moves faster
-const float kBrightestStored = 65000.0;
 
 ivec2 inside(ivec2 p) { return clamp(p, ivec2(0), ivec2(push.width, push.height) - 1); }
 ivec2 inside_history(ivec2 p) { return inside(p); }
@@ -58,19 +54,8 @@ void main() {
     vec2 at = vec2(pixel) + 0.5 + moved.xy;
     bool known = push.valid != 0u && all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(push.width, push.height))) && length(moved.xy) <= kFastest * float(push.height);
     float frames = 0.0;
-    if (known) {
-        // Something round the place was as far as this is now.
-        ivec2 middle = ivec2(floor(at));
-        float before_near = texelFetch(depth_before, inside(middle), 0).r;
-        float before_far = before_near;
-        for (int k = 0; k < 9; ++k) {
-            float d = texelFetch(depth_before, inside(middle + ivec2(k % 3 - 1, k / 3 - 1)), 0).r;
-            before_near = min(before_near, d);
-            before_far = max(before_far, d);
-        }
-        float was = here_depth * texelFetch(motion, pixel, 0).z;
-        if (was >= before_near * (1.0 - kSameDepth) && was <= before_far * (1.0 + kSameDepth)) frames = texelFetch(history, inside(middle), 0).a;
-    }
+    ivec2 place = ivec2(floor(at));
+    if (known && was_as_far(place, here_depth * texelFetch(motion, pixel, 0).z)) frames = texelFetch(history, inside(place), 0).a;
     vec3 result = now.rgb;
     if (frames > 0.0) {
         vec3 mean = sum / 9.0;

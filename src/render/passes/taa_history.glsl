@@ -1,5 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Colours as histories are kept and compared. The including kernel declares first: texture2D history, ivec2 inside_history(ivec2).
+// Colours as histories are kept and compared, and when one is of what is seen now. The including kernel declares first: texture2D history,
+// depth_before, ivec2 inside(ivec2), inside_history(ivec2).
+
+#include "render/passes/brightest.glsl"
+
+const float kDeviations = 1.25;  // of the neighbourhood that history may differ by
+const float kSameDepth = 0.005;  // share of the distance
+const float kFastest = 0.125;    // of the picture's height, a frame: nothing is kept of what moves faster
 
 // Luminance and two differences of colour, after 1 / (1 + luminance): a spark does not outweigh all else.
 vec3 bounded(vec3 c) {
@@ -34,4 +41,16 @@ vec3 history_at(vec2 at) {
     for (int j = 0; j < 4; ++j)
         for (int i = 0; i < 4; ++i) sum += x[i] * y[j] * bounded(texelFetch(history, inside_history(first + ivec2(i - 1, j - 1)), 0).rgb);
     return sum;
+}
+
+// Was something round the place (a pixel of rays) as far as `was`?
+bool was_as_far(ivec2 place, float was) {
+    float nearest = 1e30;
+    float farthest = 0.0;
+    for (int k = 0; k < 9; ++k) {
+        float d = texelFetch(depth_before, inside(place + ivec2(k % 3 - 1, k / 3 - 1)), 0).r;
+        nearest = min(nearest, d);
+        farthest = max(farthest, d);
+    }
+    return was >= nearest * (1.0 - kSameDepth) && was <= farthest * (1.0 + kSameDepth);
 }

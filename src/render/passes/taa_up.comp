@@ -26,12 +26,8 @@ ivec2 inside(ivec2 p) { return clamp(p, ivec2(0), ivec2(push.width_rays, push.he
 ivec2 inside_history(ivec2 p) { return clamp(p, ivec2(0), ivec2(push.width, push.height) - 1); }
 #include "render/passes/taa_history.glsl"
 
-const float kDeviations = 1.25;  // of the neighbourhood that history may differ by
-const float kSameDepth = 0.005;  // share of the distance
-const float kFastest = 0.125;    // of the picture's height, a frame
 const float kSharpness = 4.0;    // of a ray's weight, exp(-kSharpness d²), d in shown pixels
 const float kFirstGuess = 0.05;  // frames' worth of what is interpolated
-const float kBrightestStored = 65000.0;
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
@@ -80,26 +76,15 @@ void main() {
         }
     }
     // A frame's worth: rays are scale.x scale.y a shown pixel, and their weights' integral is pi / kSharpness.
-    float worth = 0.785398 * scale.x * scale.y * (4.0 / kSharpness);
+    float worth = 3.141593 / kSharpness * scale.x * scale.y;
     weights /= worth;
     weighted /= worth;
     vec3 moved = texelFetch(motion, front, 0).xyz;
     vec2 at = vec2(pixel) + 0.5 + moved.xy / scale;
     bool known = push.valid != 0u && all(greaterThanEqual(at, vec2(0.0))) && all(lessThan(at, vec2(push.width, push.height))) && length(moved.xy) <= kFastest * rays.y;
     float frames = 0.0;
-    if (known) {
-        // Something round the place was as far as this is now.
-        ivec2 was_at = ivec2(floor(at * scale));
-        float before_near = 1e30;
-        float before_far = 0.0;
-        for (int k = 0; k < 9; ++k) {
-            float d = texelFetch(depth_before, inside(was_at + ivec2(k % 3 - 1, k / 3 - 1)), 0).r;
-            before_near = min(before_near, d);
-            before_far = max(before_far, d);
-        }
-        float was = here_depth * texelFetch(motion, nearest, 0).z;
-        if (was >= before_near * (1.0 - kSameDepth) && was <= before_far * (1.0 + kSameDepth)) frames = texelFetch(history, inside_history(ivec2(floor(at))), 0).a;
-    }
+    if (known && was_as_far(ivec2(floor(at * scale)), here_depth * texelFetch(motion, nearest, 0).z))
+        frames = texelFetch(history, inside_history(ivec2(floor(at))), 0).a;
     vec3 kept = unbounded(guessed / max(guesses, 1e-20));
     float kept_frames = kFirstGuess;
     if (frames > 0.0) {
