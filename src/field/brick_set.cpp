@@ -17,8 +17,10 @@ constexpr float kMarginVoxels = 2;
 }  // namespace
 
 float BrickSet::voxel_size_for(const sdf::Program& object, float field_voxel) {
+    const Box3 solid = sdf::solid_box(object);
     const vec3 size = object.bounds.empty() ? vec3{} : object.bounds.max - object.bounds.min;
-    const float least = std::min({size.x, size.y, size.z}), most = std::max({size.x, size.y, size.z});
+    const vec3 whole = solid.empty() ? vec3{} : solid.max - solid.min;
+    const float least = std::min({size.x, size.y, size.z}), most = std::max({whole.x, whole.y, whole.z});
     const float wanted = least > 0 ? std::min(field_voxel, least / kLeastVoxels) : field_voxel;
     return std::max(wanted, most / kMostVoxels);
 }

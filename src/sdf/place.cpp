@@ -82,10 +82,17 @@ struct Placer {
 
 Box3 solid_box(const Program& object) {
     if (object.bounds.empty()) return object.bounds;
-    float slowest = 1;
-    for (const uint32_t row : object.rows()) slowest = std::min(slowest, object.edits[row].rate);
+    float slowest = 1, blend = 0;
+    bool first = true;
+    for (const uint32_t row : object.rows()) {
+        const EditSpan& edit = object.edits[row];
+        slowest = std::min(slowest, edit.rate);
+        // Nothing lies before the first, what blends materials moves no surface, and only a union adds to the solid.
+        if (!first && edit.op == Op::Union) blend = std::max(blend, edit.blend);
+        first = false;
+    }
     // A chain of smooth minima with radii up to k goes less than k below the least of its operands.
-    return object.bounds.inflated(object.index.largest_reach() / slowest);
+    return object.bounds.inflated(blend / slowest);
 }
 
 Program detached(const Program& program) {
