@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
-// A folder for the files of one test. Tests run side by side, each in a process of its own: no two may share a name.
+// A folder for the files of one test, and their bytes. Tests run side by side, each in a process of its own: no two may share a name.
 #pragma once
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -32,5 +34,15 @@ public:
 private:
     std::filesystem::path path_;
 };
+
+/// All of a file; empty where there is none.
+inline std::string bytes_of(const std::filesystem::path& path) {
+    std::ifstream in(path, std::ios::binary);
+    return {std::istreambuf_iterator<char>(in), {}};
+}
+/// In place of what the file held.
+inline void write_bytes(const std::filesystem::path& path, std::string_view bytes) {
+    std::ofstream(path, std::ios::binary).write(bytes.data(), std::streamsize(bytes.size()));
+}
 
 }  // namespace kiln

@@ -13,10 +13,10 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 
 namespace fs = std::filesystem;
 using kiln::AtomicFile;
+using kiln::bytes_of;
 using kiln::TempFolder;
 
 namespace {
@@ -24,10 +24,6 @@ namespace {
 class AtomicFiles : public testing::Test {
 protected:
     std::string path(const char* name) const { return (folder / name).string(); }
-    static std::string read(const std::string& file) {
-        std::ifstream in(file, std::ios::binary);
-        return {std::istreambuf_iterator<char>(in), {}};
-    }
     size_t files() const { return size_t(std::distance(fs::directory_iterator(folder.path()), {})); }
 
     const TempFolder folder;
@@ -39,9 +35,9 @@ TEST_F(AtomicFiles, TheOldFileStaysUntilCommit) {
     ASSERT_TRUE(file) << file.error().message;
     ASSERT_TRUE(file->write("new and longer"));
     std::fflush(file->stream());
-    EXPECT_EQ(read(path("a.txt")), "old");
+    EXPECT_EQ(bytes_of(path("a.txt")), "old");
     ASSERT_TRUE(file->commit());
-    EXPECT_EQ(read(path("a.txt")), "new and longer");
+    EXPECT_EQ(bytes_of(path("a.txt")), "new and longer");
     EXPECT_EQ(files(), 1u) << "a temporary was left behind";
 }
 
@@ -86,7 +82,7 @@ TEST_F(AtomicFiles, AFullDiskIsReportedAndTheOldFileStays) {
     int status = 0;
     ASSERT_EQ(waitpid(child, &status, 0), child);
     EXPECT_EQ(WEXITSTATUS(status), 0);
-    EXPECT_EQ(read(path("a.txt")), "old");
+    EXPECT_EQ(bytes_of(path("a.txt")), "old");
     EXPECT_EQ(files(), 1u);
 }
 
@@ -117,8 +113,8 @@ TEST_F(AtomicFiles, ALinkStaysALinkAndItsTargetChanges) {
         ASSERT_TRUE(file->commit());
         EXPECT_TRUE(fs::is_symlink(path(name))) << name;
     }
-    EXPECT_EQ(read(path("real.txt")), "new");
-    EXPECT_EQ(read(path("later.txt")), "new");
+    EXPECT_EQ(bytes_of(path("real.txt")), "new");
+    EXPECT_EQ(bytes_of(path("later.txt")), "new");
 }
 
 TEST_F(AtomicFiles, KeepsTheModeOfTheFileItReplaces) {

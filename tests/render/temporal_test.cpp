@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Motion and temporal anti-aliasing, each against what it stands for: reprojected points, supersampled pictures, no history at all.
-#include "gpu_worlds.h"
-#include "image/metrics.h"
+#include "over_time.h"
 #include "render/lib/color.gpu.h"
 #include "render/edit_motion.h"
 #include "render/lib/pack.h"
@@ -13,8 +12,6 @@
 
 namespace kiln::render {
 namespace {
-
-constexpr int kWidth = 96, kHeight = 72;
 
 TEST(Jitter, IsHaltonsAndItsCameraLooksThere) {
     EXPECT_EQ(jitter_of(0).x, 0.0f);
@@ -192,67 +189,12 @@ TEST_F(MotionGpu, OfWhatBlendsIsThatOfTheNearestEdit) {
     }
 }
 
-struct TaaGpu : testing::Test {
-    void SetUp() override {
-        renderer = renderer_or_skip();
-        if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
-    }
-    Picture picture(const Frame& frame, RenderSettings settings) {
-        settings.width = kWidth;
-        settings.height = kHeight;
-        return rhi::must(renderer->render(frame, settings));
-    }
-    static Frame scene() {
-        Frame frame = frame_of(on_ground());
-        frame.camera.target.y = 0.4f;
-        frame.camera.up = {0.15f, 1, 0};  // a horizon along a row of pixels would weigh as much as all else
-        frame.camera.tone_map = ToneMap::None;
-        frame.lights[0].illuminance = 2;
-        return frame;
-    }
-    // Shadows begin a part of a pixel off the surface, so they are a little other ones in a finer picture: the sky alone.
-    static Frame unlit() {
-        Frame frame = scene();
-        frame.lights.clear();
-        return frame;
-    }
-    // 64 rays a pixel, their light's mean.
-    Picture supersampled(const Frame& frame) {
-        constexpr int kSide = 8;
-        const Picture large = rhi::must(renderer->render(frame, {.width = kWidth * kSide, .height = kHeight * kSide}));
-        Picture out;
-        out.width = kWidth, out.height = kHeight;
-        for (int y = 0; y < kHeight; ++y) {
-            for (int x = 0; x < kWidth; ++x) {
-                for (size_t k = 0; k < 4; ++k) {
-                    double sum = 0;
-                    for (int j = 0; j < kSide; ++j)
-                        for (int i = 0; i < kSide; ++i)
-                            sum +=
-                                double(large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
-                    out.rgba.push_back(float(sum / (kSide * kSide)));
-                }
-            }
-        }
-        for (size_t i = 0; i < out.rgba.size(); ++i) {
-            const float v = i % 4 == 3 ? 1.0f : std::clamp(out.rgba[i], 0.0f, 1.0f);
-            out.srgb.push_back(uint8_t(std::lround(255 * (i % 4 == 3 ? v : shade::srgb_from_linear(v)))));
-        }
-        return out;
-    }
-    static image::Rgb rgb(const Picture& p) {
-        image::Rgb out;
-        out.width = p.width, out.height = p.height;
-        for (size_t i = 0; i < p.srgb.size(); ++i)
-            if (i % 4 != 3) out.values.push_back(float(p.srgb[i]) / 255);
-        return out;
-    }
+struct TaaGpu : PicturesOverTime {
     static double apart(const Picture& a, const Picture& b) { return image::flip(rgb(a), rgb(b)); }
     // How much nearer to the truth, dB.
     static double gain(const Picture& truth, const Picture& p, const Picture& plain) {
         return image::psnr(rgb(truth), rgb(p)) - image::psnr(rgb(truth), rgb(plain));
     }
-    std::unique_ptr<Renderer> renderer;
 };
 
 TEST_F(TaaGpu, WithoutJitterAStillPictureIsWhatItWas) {

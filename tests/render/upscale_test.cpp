@@ -1,16 +1,12 @@
 // SPDX-License-Identifier: MIT
 // Pictures of fewer rays, made whole over time: against supersampled ones, against what went away, against no scale at all.
-#include "gpu_worlds.h"
-#include "image/metrics.h"
-#include "render/lib/color.gpu.h"
+#include "over_time.h"
 #include "render/temporal.h"
 
 #include <cmath>
 
 namespace kiln::render {
 namespace {
-
-constexpr int kWidth = 96, kHeight = 72;
 
 TEST(Upscale, RoundsOfTheJitterFillThePixelsThatAreShown) {
     EXPECT_EQ(jitter_round(1), kJitterRound);
@@ -26,53 +22,7 @@ TEST(Upscale, RoundsOfTheJitterFillThePixelsThatAreShown) {
     EXPECT_EQ(rays_of({.width = 1, .height = 3, .scale = 0.25f}), std::pair(1, 1));
 }
 
-struct UpscaleGpu : testing::Test {
-    void SetUp() override {
-        renderer = renderer_or_skip();
-        if (!renderer && !HasFailure()) GTEST_SKIP() << "no Vulkan device";
-    }
-    Picture picture(const Frame& frame, RenderSettings settings) {
-        settings.width = kWidth;
-        settings.height = kHeight;
-        return rhi::must(renderer->render(frame, settings));
-    }
-    // The sky alone lights it: shadows begin a part of a pixel off the surface.
-    static Frame scene() {
-        Frame frame = frame_of(on_ground());
-        frame.camera.target.y = 0.4f;
-        frame.camera.up = {0.15f, 1, 0};
-        frame.camera.tone_map = ToneMap::None;
-        frame.lights.clear();
-        return frame;
-    }
-    static float shown(float v) { return std::round(255 * shade::srgb_from_linear(std::clamp(v, 0.0f, 1.0f))) / 255; }
-    static image::Rgb rgb(const Picture& p) {
-        image::Rgb out;
-        out.width = p.width, out.height = p.height;
-        for (size_t i = 0; i < p.srgb.size(); ++i)
-            if (i % 4 != 3) out.values.push_back(float(p.srgb[i]) / 255);
-        return out;
-    }
-    // 64 rays a pixel.
-    image::Rgb supersampled(const Frame& frame) {
-        constexpr int kSide = 8;
-        const Picture large = rhi::must(renderer->render(frame, {.width = kWidth * kSide, .height = kHeight * kSide}));
-        image::Rgb out;
-        out.width = kWidth, out.height = kHeight;
-        for (int y = 0; y < kHeight; ++y) {
-            for (int x = 0; x < kWidth; ++x) {
-                for (size_t k = 0; k < 3; ++k) {
-                    double sum = 0;
-                    for (int j = 0; j < kSide; ++j)
-                        for (int i = 0; i < kSide; ++i)
-                            sum +=
-                                double(large.rgba[size_t(((y * kSide + j) * kWidth * kSide + x * kSide + i) * 4) + k]);
-                    out.values.push_back(shown(float(sum / (kSide * kSide))));
-                }
-            }
-        }
-        return out;
-    }
+struct UpscaleGpu : PicturesOverTime {
     // Of fewer rays, each in all the pixels that it covers.
     image::Rgb blocks(const Frame& frame, int by) {
         const Picture small = rhi::must(renderer->render(frame, {.width = kWidth / by, .height = kHeight / by}));
@@ -84,12 +34,11 @@ struct UpscaleGpu : testing::Test {
                     out.values.push_back(float(small.srgb[size_t((y / by * (kWidth / by) + x / by) * 4) + k]) / 255);
         return out;
     }
-    std::unique_ptr<Renderer> renderer;
 };
 
 TEST_F(UpscaleGpu, AQuarterOfTheRaysComesNearSixtyFourAPixel) {
-    const Frame frame = scene();
-    const image::Rgb truth = supersampled(frame);
+    const Frame frame = unlit();
+    const image::Rgb truth = rgb(supersampled(frame));
     Picture p;
     const RenderSettings half{.taa = true, .scale = 0.5f};
     for (int i = 0; i < 32; ++i) p = picture(frame, half);
@@ -111,14 +60,14 @@ TEST_F(UpscaleGpu, AQuarterOfTheRaysComesNearSixtyFourAPixel) {
 }
 
 TEST_F(UpscaleGpu, AMovingCameraIsNearlyAsSharpAsWithAllRays) {
-    Frame frame = scene();
+    Frame frame = unlit();
     Picture p;
     const Camera last = frame.camera;
     for (int i = 23; i >= 0; --i) {
         frame.camera.position = last.position + vec3{0.013f, 0.004f, -0.011f} * float(i);
         p = picture(frame, {.taa = true, .scale = 0.5f});
     }
-    const image::Rgb truth = supersampled(frame);
+    const image::Rgb truth = rgb(supersampled(frame));
     const double moving = image::flip(truth, rgb(p)), of_blocks = image::flip(truth, blocks(frame, 2));
     for (int i = 23; i >= 0; --i) {
         frame.camera.position = last.position + vec3{0.013f, 0.004f, -0.011f} * float(i);
@@ -134,7 +83,7 @@ TEST_F(UpscaleGpu, AMovingCameraIsNearlyAsSharpAsWithAllRays) {
 // Gate: gone within three pictures.
 TEST_F(UpscaleGpu, NothingOfWhatWentAwayStays) {
     const auto ball_at = [&](vec3 at) {
-        Frame out = scene();
+        Frame out = unlit();
         field::worlds::World world = on_ground();
         Edit ball = field::worlds::edit(Sphere{.radius = 0.25f}, at);
         ball.node.material = MaterialId{1, 0};
@@ -173,7 +122,7 @@ TEST_F(UpscaleGpu, NothingOfWhatWentAwayStays) {
 }
 
 TEST_F(UpscaleGpu, ScaleOneIsNoScaleAndAStrangeOneIsRefused) {
-    const Frame frame = scene();
+    const Frame frame = unlit();
     std::vector<Picture> with, without;
     for (int i = 0; i < 3; ++i) without.push_back(picture(frame, {.taa = true, .cut = i == 0}));
     for (int i = 0; i < 3; ++i) with.push_back(picture(frame, {.taa = true, .cut = i == 0, .scale = 1}));
@@ -193,7 +142,7 @@ TEST_F(UpscaleGpu, ScaleOneIsNoScaleAndAStrangeOneIsRefused) {
 
 // What follows the upscaling has the size that is shown: lines, outlines and bloom, and the distances that the picture tells.
 TEST_F(UpscaleGpu, LinesAndOutlinesAreDrawnAtTheSizeThatIsShown) {
-    Frame frame = scene();
+    Frame frame = unlit();
     frame.camera.bloom = 0.1f;
     frame.lines = {{.a = {-0.8, 0.9, 0.2}, .b = {0.9, 0.7, 0.2}, .color = {1, 0, 0}, .width_px = 1.5f, .hidden = 0}};
     frame.outlines = {{.row = frame.field->program().rows()[1], .outline = {.color = {0, 1, 0}, .width_px = 3}}};

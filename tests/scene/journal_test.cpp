@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "scene/journal.h"
 
+#include "kept_scene.h"
 #include "random_changes.h"
 #include "scene_text.h"
 #include "temp_folder.h"
@@ -13,8 +14,6 @@
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <new>
 #include <fcntl.h>
 #include <sys/mman.h>
@@ -30,27 +29,9 @@ namespace fs = std::filesystem;
 using scene::RandomChanges;
 using testing::HasSubstr;
 
-std::string bytes_of(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-void write(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
-
-Edit ball(const std::string& name, float radius) {
-    Edit e;
-    e.name = name;
-    e.node.shape = Sphere{.radius = radius};
-    return e;
-}
-
-const std::string kScene =
-    "{\"format\": 1, \"materials\": {\"clay\": {}}, \"edits\": [{\"id\": \"a\", \"material\": \"clay\", \"shape\": "
-    "\"sphere\", \"scale\": 2, \"outline\": {\"width_px\": 5}}, {\"id\": \"b\", \"shape\": \"box\", \"position\": [0, "
-    "0, 0]}], \"wind\": [1, 0, 0]}";
-
 class Journals : public testing::Test {
 protected:
-    void SetUp() override { write(scene_, kScene); }
+    void SetUp() override { write_bytes(scene_, kScene); }
 
     World open() {
         auto world = World::open(scene_);
@@ -62,8 +43,8 @@ protected:
         return world ? world->to_json() : world.error().message;
     }
     void be(const std::string& scene, const std::string& journal) {
-        write(scene_, scene);
-        write(journal_, journal);
+        write_bytes(scene_, scene);
+        write_bytes(journal_, journal);
     }
 
     const TempFolder folder_;
@@ -206,7 +187,7 @@ TEST_F(Journals, AKillAtAnyPointOfSavingLosesNothing) {
     std::string journal_marked, journal_on;
     {
         std::string bytes;
-        write(journal_, journal_before);
+        write_bytes(journal_, journal_before);
         auto file = RecordFile::open(journal_, bytes);
         ASSERT_TRUE(file && file->resume(read_records(bytes)) && file->append(scene::saved_record(hash)));
         journal_marked = bytes_of(journal_);
@@ -260,7 +241,7 @@ TEST_F(Journals, ABrokenJournalOpensToItsLastGoodCommandAndKeepsTheRest) {
     const std::string whole = bytes_of(journal_);
     ASSERT_EQ(ends.back(), whole.size());
     const auto check = [&](const std::string& journal, size_t good, const std::string& what) {
-        write(journal_, journal);
+        write_bytes(journal_, journal);
         size_t state = 0;
         while (state + 1 < ends.size() && ends[state + 1] <= good) ++state;
         const auto world = World::load(scene_);
@@ -283,7 +264,7 @@ TEST_F(Journals, ABrokenJournalOpensToItsLastGoodCommandAndKeepsTheRest) {
     for (const char* name : {"s.kiln.json.journal.dropped", "s.kiln.json.journal.dropped-2"}) {
         std::string broken = whole;
         broken[ends[1] + 20] ^= 1;
-        write(journal_, broken);
+        write_bytes(journal_, broken);
         World world = open();
         EXPECT_EQ(world.to_json(), states[1]);
         EXPECT_EQ(bytes_of(folder_ / name), broken.substr(ends[1]));
@@ -299,7 +280,7 @@ TEST_F(Journals, AForeignJournalIsPutAside) {
         ASSERT_TRUE(world.add(ball("c", 1)));
     }
     const std::string other = "{\"format\": 1, \"edits\": [{\"id\": \"only\", \"shape\": \"sphere\"}]}";
-    write(scene_, other);
+    write_bytes(scene_, other);
     const std::string journal = bytes_of(journal_);
     const auto read = World::load(scene_);
     ASSERT_TRUE(read);
@@ -441,7 +422,7 @@ TEST_F(Journals, WhatARecordCannotDoEndsTheReading) {
         EXPECT_EQ(read->edits().size(), 3u) << bad;
         EXPECT_TRUE(read->find_edit("c")) << bad;
         EXPECT_THAT(read->journal_report()->sentence(), HasSubstr("record 2 cannot be applied")) << bad;
-        write(journal_, good);
+        write_bytes(journal_, good);
     }
 }
 
@@ -488,7 +469,7 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
     const fs::path scene = folder / "s.kiln.json", journal = folder / "s.kiln.json.journal";
     const fs::path twin_folder = folder / "twin", twin = twin_folder / "s.kiln.json";
     fs::create_directory(twin_folder);
-    write(folder / "told", std::string(sizeof(Told), '\0'));
+    write_bytes(folder / "told", std::string(sizeof(Told), '\0'));
     const int fd = ::open((folder / "told").c_str(), O_RDWR);
     auto* const told = new (::mmap(nullptr, sizeof(Told), PROT_READ | PROT_WRITE, MAP_SHARED, fd, 0)) Told;
     std::mt19937 random{uint32_t(rounds)};
@@ -553,7 +534,7 @@ void kill_rounds(const fs::path& folder, int rounds, int most_us) {
         if (left->edits().size() > 300) {
             fs::remove(journal);
             fs::remove(folder / "s.kiln.json.history");
-            write(scene, kScene);
+            write_bytes(scene, kScene);
         }
         // A temporary that a kill left while saving is nobody's.
         for (const auto& entry : fs::directory_iterator(folder))

@@ -2,6 +2,7 @@
 // Undo beyond saves, in the program that saved and in later ones.
 #include "scene/past.h"
 
+#include "kept_scene.h"
 #include "random_changes.h"
 #include "temp_folder.h"
 
@@ -10,8 +11,6 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <set>
 #include <string>
 #include <utility>
@@ -24,27 +23,9 @@ namespace fs = std::filesystem;
 using scene::RandomChanges;
 using testing::HasSubstr;
 
-std::string bytes_of(const fs::path& path) {
-    std::ifstream in(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(in), {}};
-}
-void write(const fs::path& path, const std::string& bytes) { std::ofstream(path, std::ios::binary) << bytes; }
-
-const std::string kScene =
-    "{\"format\": 1, \"materials\": {\"clay\": {}}, \"edits\": [{\"id\": \"a\", \"material\": \"clay\", \"shape\": "
-    "\"sphere\", \"scale\": 2, \"outline\": {\"width_px\": 5}}, {\"id\": \"b\", \"shape\": \"box\", "
-    "\"position\": [0, 0, 0]}], \"wind\": [1, 0, 0]}";
-
-Edit ball(const std::string& name, float radius) {
-    Edit e;
-    e.name = name;
-    e.node.shape = Sphere{.radius = radius};
-    return e;
-}
-
 class Pasts : public testing::Test {
 protected:
-    void SetUp() override { write(scene_, kScene); }
+    void SetUp() override { write_bytes(scene_, kScene); }
     World open() {
         auto world = World::open(scene_, 1);
         EXPECT_TRUE(world) << world.error().message;
@@ -163,7 +144,7 @@ TEST_F(Pasts, AKillAtAnyPointOfSavingLosesNoState) {
     ASSERT_GT(past_after.size(), past_before.size());
     std::string marked;
     {
-        write(journal_, journal_before);
+        write_bytes(journal_, journal_before);
         std::string bytes;
         auto file = RecordFile::open(journal_, bytes);
         const auto hash = hash128(std::as_bytes(std::span(scene_after.data(), scene_after.size())));
@@ -171,9 +152,9 @@ TEST_F(Pasts, AKillAtAnyPointOfSavingLosesNoState) {
         marked = bytes_of(journal_);
     }
     const auto check = [&](const std::string& scene, const std::string& journal, const std::string& past) {
-        write(scene_, scene);
-        write(journal_, journal);
-        write(history_, past);
+        write_bytes(scene_, scene);
+        write_bytes(journal_, journal);
+        write_bytes(history_, past);
         for (int program = 0; program < 2; ++program) {
             World again = open();
             EXPECT_EQ(again.edits().size(), size_t(4 + program));
@@ -208,12 +189,12 @@ TEST_F(Pasts, ADamagedOrForeignOneIsLeftOutAndBegunAnew) {
     for (size_t at = 0; at < past.size(); at += 11) {
         std::string broken = past;
         broken[at] = char(uint8_t(broken[at]) ^ uint8_t(1u << (at % 8)));
-        write(history_, broken);
+        write_bytes(history_, broken);
         const auto read = World::load(scene_, 1, true);
         ASSERT_TRUE(read) << at;
         ASSERT_EQ(read->to_json(), text) << at;
     }
-    write(history_, past.substr(0, past.size() / 2));
+    write_bytes(history_, past.substr(0, past.size() / 2));
     {
         World world = open();
         EXPECT_EQ(world.to_json(), text);
@@ -226,7 +207,7 @@ TEST_F(Pasts, ADamagedOrForeignOneIsLeftOutAndBegunAnew) {
     ASSERT_TRUE(world.save(scene_));
     world = World();
     const std::string other = "{\"format\": 1, \"edits\": [{\"id\": \"only\", \"shape\": \"sphere\"}]}";
-    write(scene_, other);
+    write_bytes(scene_, other);
     world = open();
     EXPECT_EQ(world.edits().size(), 1u);
     EXPECT_TRUE(world.history().steps().empty());
@@ -249,7 +230,7 @@ TEST_F(Pasts, ASaveThatFailsAndOneThatDoesNotKeepEveryStepOnce) {
             ASSERT_FALSE(world.save(scene_));
         }
         fs::remove(scene_);
-        write(scene_, scene);
+        write_bytes(scene_, scene);
         ASSERT_TRUE(world.add(ball("f", 1)));
         ASSERT_TRUE(world.save(scene_));
     }
