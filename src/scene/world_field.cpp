@@ -26,6 +26,8 @@ namespace {
 /// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
 constexpr double kMaxCells = double(1u << 25);
 constexpr int kMostDoublings = 24;
+// Three quarters of what the renderer's atlas holds; the rest is for what moves.
+constexpr uint32_t kMostBricks = 3u << 16;
 /// More changes than this since the last field, and it is built anew: what so large a share of a world reaches is most of it, and finding
 /// the changes of a place takes as long as there are changes.
 size_t most_changes(size_t edits) { return std::clamp<size_t>(edits / 4, 256, 8192); }
@@ -211,6 +213,7 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
     options.voxel_size = r.voxel_size;
     options.bounds = r.bounds;
     options.format = settings.distance_8bit ? field::DistanceFormat::Snorm8 : field::DistanceFormat::Half;
+    options.max_bricks = kMostBricks;
     for (;; ++next.coarsened, options.voxel_size *= 2) {
         if (cells_of(options.bounds, options.voxel_size) > kMaxCells && next.coarsened < kMostDoublings) continue;
         auto made = field::Field::build(now, options);
