@@ -108,19 +108,16 @@ uint32_t ambiguous_faces(uint32_t solid) {
     return out;
 }
 
-CellLoops cell_loops(uint32_t solid, uint32_t flipped) {
+CellLoops cell_loops(uint32_t solid) {
     int next[12];
     std::fill_n(next, 12, kNone);
     for (int face = 0; face < 6; ++face) {
         const std::array<int, 4> c = face_corners(face);
         const auto is = [&](int i) { return (solid >> c[size_t(i & 3)] & 1u) != 0; };
-        const bool flip = (flipped & ambiguous_faces(solid) & (1u << face)) != 0;
         for (int i = 0; i < 4; ++i) {
             if (is(i) || !is(i + 1)) continue;  // enters the solid between corners i and i + 1
-            int leave = flip ? i + 3 : i + 1;
-            if (!flip)
-                while (is(leave + 1)) ++leave;
-            // On an alternating face the edge before an entry is the previous exit.
+            int leave = i + 1;
+            while (is(leave + 1)) ++leave;
             next[edge_between(c[size_t(i)], c[size_t(i + 1) & 3])] =
                 edge_between(c[size_t(leave & 3)], c[size_t(leave + 1) & 3]);
         }
@@ -133,7 +130,6 @@ CellLoops cell_loops(uint32_t solid, uint32_t flipped) {
         for (int e = edge; !done[e]; e = next[e]) {
             KILN_ASSERT(next[e] != kNone, "corner signs {}: edge {} ends no segment", solid, e);
             done[e] = true;
-            out.loop_of[e] = out.count;
             out.edges[end++] = uint8_t(e);
         }
         out.first[++out.count] = end;
@@ -158,6 +154,7 @@ const CellTables& cell_tables() {
         for (uint32_t solid = 0; solid < 256; ++solid) {
             out.loops[solid] = cell_loops(solid);
             out.triangles[solid] = cell_triangles(out.loops[solid]);
+            out.plain[solid] = out.loops[solid].count <= 1 && ambiguous_faces(solid) == 0;
         }
         return out;
     }();

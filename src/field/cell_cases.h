@@ -2,8 +2,7 @@
 // What the eight corner signs of a voxel say about the surface in it: closed loops of crossed edges, and their triangles.
 //
 // Nothing is tabled by hand. On each face the crossed edges are joined by a rule that sees only the face's four signs, so both
-// voxels of a face draw the same segments: runs of solid corners are cut off one by one ("separate the solids"), or, on a
-// flipped face, runs of empty corners. Walked as seen from outside the voxel, a segment goes from the edge where the walk enters the
+// voxels of a face draw the same segments: runs of solid corners are cut off one by one ("separate the solids"). Walked as seen from outside the voxel, a segment goes from the edge where the walk enters the
 // solid to one where it leaves. An edge has two faces that walk it in opposite directions, so it starts one segment and
 // ends one: the segments of a voxel close into loops.
 // Marching cubes: Lorensen and Cline, "Marching Cubes", 1987. Ambiguous faces: Nielson and Hamann, "The Asymptotic Decider", 1991;
@@ -19,18 +18,17 @@
 namespace kiln::field {
 
 inline constexpr int kMostLoops = 4;      // each has three edges or more, and a voxel twelve
-inline constexpr int kMostTriangles = 5;  // of any of the 256 voxels with no face flipped
+inline constexpr int kMostTriangles = 5;  // of any of the 256 voxels
 
 /// The loops of one voxel, edges in order, anticlockwise as seen from the empty side.
 struct CellLoops {
     uint8_t count = 0;
     uint8_t first[kMostLoops + 1] = {};  ///< loop i is edges[first[i]] … edges[first[i + 1] - 1]
     uint8_t edges[12] = {};
-    uint8_t loop_of[12] = {};  ///< by edge; of crossed edges only
 };
 
-/// Bit c of `solid`: corner c is solid. Bit f of `flipped`: face f, where ambiguous, cuts off empty corners instead.
-CellLoops cell_loops(uint32_t solid, uint32_t flipped = 0);
+/// Bit c of `solid`: corner c is solid.
+CellLoops cell_loops(uint32_t solid);
 
 /// Bits of the faces whose signs alternate around it.
 uint32_t ambiguous_faces(uint32_t solid);
@@ -45,10 +43,11 @@ struct CellTriangles {
 /// diagonal in one: the surface is a manifold whatever the signs. Among those, least squared length of diagonals between middles.
 CellTriangles cell_triangles(const CellLoops& loops);
 
-/// By `solid`, no face flipped; made at first use.
+/// By `solid`; made at first use.
 struct CellTables {
     std::array<CellLoops, 256> loops;
     std::array<CellTriangles, 256> triangles;
+    std::array<bool, 256> plain;  ///< one loop at most, and no ambiguous face
 };
 const CellTables& cell_tables();
 

@@ -6,6 +6,7 @@
 #include "field/host_bricks.h"
 
 #include <cstddef>
+#include <cstring>
 #include <memory>
 #include <new>
 #include <span>
@@ -28,6 +29,17 @@ public:
         }
         size_ = count;
     }
+    /// Keeps the contents so far.
+    void grow(size_t count) {
+        if (count > capacity_) {
+            std::unique_ptr<T, Free> kept = std::move(data_);
+            const size_t size = size_;
+            capacity_ = 0;
+            resize(count + count / 16);
+            if (size != 0) std::memcpy(data_.get(), kept.get(), size * sizeof(T));
+        }
+        size_ = count;
+    }
     size_t size() const { return size_; }
     T* data() { return data_.get(); }
     const T* data() const { return data_.get(); }
@@ -47,6 +59,8 @@ struct Mesh {
     Buffer<vec3> positions;
     Buffer<uint32_t> triangles;       ///< three vertices each
     Buffer<uint32_t> brick_vertices;  ///< brick i of the MeshBricks made vertices [i] … [i + 1] - 1, which lie in it
+    Buffer<uint32_t>
+        late_bricks;  ///< of those after [bricks]: a brick that each lies in; one brick's are never far apart
 
     size_t vertex_count() const { return positions.size(); }
     size_t triangle_count() const { return triangles.size() / 3; }

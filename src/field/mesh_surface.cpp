@@ -53,6 +53,20 @@ MeshSurface surface_of(const HostBricks& host, const MeshBricks& bricks, const M
                 points(size_t(brick), first, std::min(kMost, end - first));
         },
         16);
+    // The late ones by runs of one brick.
+    const Buffer<uint32_t>& late = mesh.late_bricks;
+    const size_t before = mesh.vertex_count() - late.size();
+    std::vector<size_t> runs;
+    for (size_t i = 0; i < late.size(); ++i)
+        if (i == 0 || late[i] != late[i - 1] || i - runs.back() == kMost) runs.push_back(i);
+    parallel_for(
+        runs.size(), workers,
+        [&](int run) {
+            const size_t first = runs[size_t(run)],
+                         end = size_t(run) + 1 < runs.size() ? runs[size_t(run) + 1] : late.size();
+            points(late[first], before + first, end - first);
+        },
+        16);
     return out;
 }
 

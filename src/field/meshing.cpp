@@ -124,6 +124,7 @@ void mesh_smooth(const MeshBricks& bricks, Mesh& out, int workers) {
     out.brick_vertices.resize(bricks.bricks().size() + 1);
     for (size_t i = 0; i < bricks.bricks().size(); ++i) out.brick_vertices[i] = edges[i].first_edge;
     out.brick_vertices[bricks.bricks().size()] = edges.edge_count();
+    out.late_bricks.resize(0);
     Smooth smooth(edges, out);
     parallel_for(
         bricks.rows().size(), workers,

@@ -22,10 +22,10 @@ ExactBrick exact_of(const HostBricks& host, const MeshBricks& bricks);
 
 /// Dual: a vertex in each voxel for each sheet of the surface there (Nielson, "Dual Marching Cubes", 2004), where the planes of the
 /// surface at the voxel's crossed edges meet (Ju, Losasso, Schaefer and Warren, "Dual Contouring of Hermite Data", 2002), so
-/// edges and corners of shapes stay sharp. A vertex never leaves its voxel, and lies within kSharpTolerance of the surface or on
-/// one of the edge crossings.
+/// edges and corners of shapes stay sharp. A vertex never leaves its voxel, and lies within kSharpTolerance of the surface or on or near
+/// one of the edge crossings. No two triangles cross (dual_quads.h).
 void mesh_sharp(const MeshBricks& bricks, const ExactBrick& exact, Mesh& out, int workers = 0);
-inline constexpr float kSharpTolerance = 0.1f;  // voxels
+inline constexpr float kSharpTolerance = 0.05f;  // voxels
 
 /// What the exact field says at the vertices.
 struct MeshSurface {

@@ -639,9 +639,10 @@ private:
         }
         constexpr double kVertexFlops = 20;  // operations that place a vertex on its edge
         out.roof_ratio = kVertexFlops * double(made.vertex_count()) / (roofs().flops * threads) / least[0];
-        // Two triangles a crossed edge, or a vertex each.
+        // Two triangles a crossed edge and a late vertex, or a vertex an edge.
         const auto [triangles, edges] = crossings(bricks);
-        run_.add_checked(out, hash_combine(made.triangle_count(), sharp ? 0 : made.vertex_count()),
+        const uint64_t quads = made.triangle_count() - 2 * made.late_bricks.size();
+        run_.add_checked(out, sharp ? hash_combine(quads, 0) : hash_combine(made.triangle_count(), made.vertex_count()),
                          sharp ? hash_combine(2 * edges, 0) : hash_combine(triangles, edges));
     }
 

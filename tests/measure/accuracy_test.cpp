@@ -2,7 +2,9 @@
 // How true the bricks' answers are on the published scene, against the exact edits: what the scene says of the engine, not of the machine.
 #include "measure/recipes.h"
 
-#include "field/host_bricks.h"
+#include "field/mesh_facts.h"
+#include "field/meshing.h"
+#include "field/self_crossings.h"
 #include "scene/exact.h"
 #include "sdf/program.h"
 
@@ -19,8 +21,8 @@ struct Baked {
     field::HostBricks bricks;
 };
 
-Baked baked(int kind) {
-    const std::vector<Edit> edits = recipe(kind, 5, 1000);
+Baked baked(int kind, uint32_t seed = 5) {
+    const std::vector<Edit> edits = recipe(kind, seed, 1000);
     Baked out;
     out.program = std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}}));
     field::FieldOptions options;
@@ -85,6 +87,48 @@ TEST_P(EachKind, RefinedRaysHitWhatTheExactEditsShow) {
     EXPECT_LE(errors[errors.size() / 2], 0.02);
     EXPECT_LE(p99, 0.1);
 }
+
+class EachKindSlow : public testing::TestWithParam<int> {};
+
+TEST_P(EachKindSlow, MeshesAreClosedNearTheSurfaceAndNeverCrossThemselves) {
+    for (const uint32_t seed : {5u, 6u, 7u}) {
+        const Baked b = baked(GetParam(), seed);
+        const field::MeshBricks bricks(b.bricks);
+        const float voxel = bricks.voxel_size();
+        const scene::ExactField exact(*b.program);
+        for (const bool sharp : {false, true}) {
+            field::Mesh mesh;
+            if (sharp)
+                field::mesh_sharp(bricks, field::exact_of(b.bricks, bricks), mesh);
+            else
+                field::mesh_smooth(bricks, mesh);
+            const field::MeshFacts facts = field::mesh_facts(mesh.positions.span(), mesh.triangles.span());
+            EXPECT_GT(facts.triangles, 900000u);
+            EXPECT_EQ(facts.open_edges, 0u);
+            EXPECT_EQ(facts.non_manifold_edges, 0u);
+            EXPECT_EQ(facts.vertices, mesh.vertex_count());
+            const auto crossings =
+                field::meshes::SelfCrossings(mesh.positions.span(), mesh.triangles.span()).count(voxel);
+            EXPECT_EQ(crossings.apart + crossings.at_vertex, 0u) << "seed " << seed << (sharp ? " sharp" : " smooth");
+            std::vector<float> off(mesh.vertex_count());
+            exact.distance(mesh.positions.span(), off.data());
+            double most = 0, squares = 0;
+            for (const float d : off) {
+                most = std::max(most, std::abs(double(d)) / voxel);
+                squares += double(d) * double(d) / (voxel * voxel);
+            }
+            const double rms = std::sqrt(squares / double(off.size()));
+            std::printf("kind %d seed %u %s: %zu triangles, %zu late vertices, off by %.4f rms, %.4f at most\n",
+                        GetParam(), seed, sharp ? "sharp" : "smooth", size_t(facts.triangles), mesh.late_bricks.size(),
+                        rms, most);
+            if (!sharp) continue;
+            EXPECT_LE(rms, 0.025);
+            EXPECT_LE(most, 0.5);
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, EachKindSlow, testing::Values(0, 1, 2));
 
 INSTANTIATE_TEST_SUITE_P(Kinds, EachKind, testing::Values(0, 1, 2));
 

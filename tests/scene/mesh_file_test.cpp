@@ -2,6 +2,7 @@
 // Worlds to meshes to files, read back by a reader that shares no code with the writers.
 #include "scene/mesh_file.h"
 
+#include "field/self_crossings.h"
 #include "scene_text.h"
 #include "temp_folder.h"
 
@@ -86,6 +87,27 @@ TEST(WorldMesh, BundledScenesAreClosedSmoothAndSharp) {
         const vec3 size = box.max - box.min;
         const float cell = std::max({size.x, size.y, size.z}) / 100;
         for (const bool sharp : {false, true}) expect_closed(mesh_of(*world, {.cell = cell, .sharp = sharp}), name);
+    }
+}
+
+TEST(WorldMeshSlow, BundledScenesNeverCrossThemselves) {
+    for (const auto& [name, description] : bundled_scenes()) {
+        const auto world = World::load(name);
+        ASSERT_TRUE(world);
+        const Box3 box = world->field_settings.bounds.value_or(world->bounds());
+        const vec3 size = box.max - box.min;
+        for (const float cells : {97.0f, 211.0f}) {
+            const float cell = std::max({size.x, size.y, size.z}) / cells;
+            for (const bool sharp : {false, true}) {
+                const Mesh mesh = mesh_of(*world, {.cell = cell, .sharp = sharp});
+                expect_closed(mesh, name);
+                const auto found = field::meshes::SelfCrossings(mesh.positions, mesh.triangles).count(cell);
+                EXPECT_EQ(found.apart + found.at_vertex, 0u)
+                    << name << ": at " << found.example.x << ' ' << found.example.y << ' ' << found.example.z;
+                std::printf("%s %s at %g m: %zu triangles\n", std::string(name).c_str(), sharp ? "sharp" : "smooth",
+                            double(cell), mesh.triangles.size() / 3);
+            }
+        }
     }
 }
 
