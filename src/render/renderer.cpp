@@ -40,9 +40,9 @@ namespace {
 constexpr int kTileWidth = 4096;
 constexpr int kTilePixels = 1 << 21;
 constexpr int kTilePixelsOfGpu = 9 << 20;
-// Pixels whose rays may be bent at once: a buffer of them is within a binding.
-constexpr int kBentRays = 1 << 21;
-static_assert(uint64_t{kBentRays} * sizeof(FrameRay) <= rhi::kMaxStorageBinding);
+// Pixels whose rays may be bent at once: a buffer of twice as many is within a binding.
+constexpr int kBentRays = 1 << 20;
+static_assert(2 * uint64_t{kBentRays} * sizeof(FrameRay) <= rhi::kMaxStorageBinding);
 
 }  // namespace
 }  // namespace render
@@ -283,6 +283,8 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
         out.frame = g.block(part);
         part.flags |= kFrameRays;
         out.frame_of_rays = g.block(part);
+        part.tile_height *= 2;
+        out.frame_of_parted = g.block(part);
         LightRects rects = (part.flags & kFrameAllLights) == 0
                                ? light_rects(frame.lights, params.camera, rect.x, rect.y, rect.width, rect.height)
                                : all_light_rects(frame.lights.size(), rect.width, rect.height);
@@ -291,7 +293,7 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
         out.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
     }
     if (in.through.empty()) return;
-    LightRects all = all_light_rects(frame.lights.size(), params.tile_width, params.tile_height);
+    LightRects all = all_light_rects(frame.lights.size(), params.tile_width, 2 * params.tile_height);
     if (all.rects.empty()) all.rects.emplace_back();
     in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
 }

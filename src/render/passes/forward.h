@@ -8,9 +8,8 @@ namespace kiln::render {
 
 extern const RasterKernel kLines, kOutlineHull;
 extern const Kernel kLinesOver, kOutlineMeshes;
-extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughEnter, kThroughBend,
-    kThroughBendImage, kThroughEnd, kThroughFront, kThroughMirror, kThroughMirrored, kThroughMirroredImage, kMeshTrace,
-    kShadowGlass;
+extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughBend, kThroughBendImage,
+    kThroughTotal, kThroughEnd, kThroughFront, kMeshTrace, kShadowGlass;
 extern const Kernel kParticles, kParticlesStart, kParticlesLight, kParticlesLightImage;
 
 // What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.

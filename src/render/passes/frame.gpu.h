@@ -52,7 +52,7 @@ KILN_CONST uint kFrameRefine = 32u;          // points of bricks are moved to wh
 // A ray given from outside (tests, queries): origin in voxels, unit direction.
 struct FrameRay {
     int whole_x, whole_y, whole_z;
-    float pad_0;
+    float within;  // the number of the glass that it goes through, plus one; 0: none
     float part_x, part_y, part_z;
     float pad_1;
     float direction_x, direction_y, direction_z;

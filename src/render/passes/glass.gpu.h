@@ -18,17 +18,25 @@ struct GlassRecord {
 };
 
 // What a pixel's ray does, beside the share of light that it brings.
-KILN_CONST float kRayRests = 0.0f;  // nothing: its light is summed up
+KILN_CONST float kRayRests = 0.0f;  // nothing: it has met what is solid, or the sky
 KILN_CONST float kRayGoes = 1.0f;
-KILN_CONST float kRayEnds = 2.0f;  // it meets something solid next, inside glass
+KILN_CONST float kRayParted = 2.0f;  // likewise; what it threw back where it left glass first goes its own way
+
+// A step of rays through what is transparent, see through_bend.comp.
+KILN_CONST uint kThroughCamera = 1u;  // the first of the camera's rays, for which what is solid is lit already
+KILN_CONST uint kThroughParts = 2u;   // rays part: what glass mirrors, and what it throws back from inside
+KILN_CONST uint kThroughLast = 4u;    // what else lets light through is not looked at
+KILN_CONST uint kThroughBegins = 8u;  // no ray has ended yet
+
+// A visibility word's state along rays inside glass: they leave it past an edge too thin for a voxel, unbent.
+KILN_CONST uint kSeenGlassLeft = 8u;
 
 // A part of the tile where something may let light through, a picture of its own.
 struct ThroughPush {
     int from_x, from_y;  // its first pixel in the tile
     int width, height;
-    uint passed;  // surfaces that rays have passed before
-    uint last;    // 1: what else lets light through is not looked at
-    uint pad_0, pad_1;
+    uint step;  // some of kThrough…
+    uint pad_0, pad_1, pad_2;
 };
 
 struct MeshTracePush {

@@ -1,10 +1,11 @@
 #version 460
 // SPDX-License-Identifier: MIT
 // Glass along rays, where it is nearer than what was found before: the ray goes down its tree and into each object's bricks. Of equals the lower
-// number. An eye inside glass sees out of it unbent.
+// number. An eye inside glass sees out of it unbent; a ray that came in by its surface meets that from inside.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
+#include "render/passes/glass.gpu.h"
 #include "render/passes/instances.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
@@ -21,7 +22,11 @@ layout(set = 0, binding = 8) uniform utexture2D seen_before;
 layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D visibility;
 layout(push_constant) uniform Push { InstancePush push; };
 
+// A ray that starts inside has the surface it came by behind it, by less than the bricks' own error.
+const float kPastVoxels = 0.25;
+
 #define KILN_INSTANCE_WALK
+#define KILN_FROM_INSIDE
 #include "render/passes/instances.glsl"
 #include "render/passes/rays.glsl"
 
@@ -31,6 +36,22 @@ void main() {
     uvec4 seen = texelFetch(seen_before, pixel, 0);
     TexelRay ray = pixel_ray(pixel);
     vec3 from = from_eye(ray);
+    float within = (frame.flags & kFrameRays) != 0u ? rays[pixel.y * frame.tile_width + pixel.x].within : 0.0;
+    if (within > 0.0) {
+        uint index = uint(within) - 1u;
+        InstanceRecord instance = instances[index];
+        here = sets[instance.set];
+        MarchHit hit = field_march(here.grid, object_ray(instance, from, ray.direction), kPastVoxels, kFarVoxels, true);
+        float t = hit.state == kMarchMiss ? 0.0 : hit.t / instance.voxels;
+        if (t < uintBitsToFloat(seen.x)) {
+            seen.x = floatBitsToUint(t);
+            seen.y = ((hit.state == kMarchHit ? kSeenInstance : kSeenGlassLeft) << 28u) | index;
+            seen.z = uint(hit.voxel.x | (hit.voxel.y << 3) | (hit.voxel.z << 6)) | (uint(hit.slot) << kInstanceSlotShift);
+        }
+        imageStore(visibility, pixel, seen);
+        return;
+    }
+    inside_out = false;
     vec3 inverse = walk_inverse(ray.direction);
     float nearest = uintBitsToFloat(seen.x);
     uint nearest_instance = kNoInstance;

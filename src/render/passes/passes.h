@@ -98,6 +98,7 @@ struct ThroughPart {
     int x = 0, y = 0;  // its first pixel in the tile
     rhi::Extent size;
     Block frame, frame_of_rays;  // FrameParams, by the camera's rays and by given ones
+    Block frame_of_parted;       // likewise of two pictures, one below the other
     Buffer light_rects;          // for the camera's rays
     uint32_t lights_of_tile = 0;
 };
@@ -159,7 +160,7 @@ struct TileInputs {
     bool outline_hulls = false;    // … or are not used: see draw_hulls()
     bool has_particles = false;
     ParticleHandles particles;
-    Buffer all_light_rects;  // LightRect a light, all of any picture; where `through` is not empty
+    Buffer all_light_rects;  // LightRect a light, all of twice any picture; where `through` is not empty
     bool has_cascades = false;
     uint32_t mapped_light = 0;  // whose
     CascadeHandles cascades;

@@ -57,6 +57,8 @@ void main() {
     bool up_is_other = false;
     Mix mixed = make_mix(0.0, 0.0, 0.0);
     uvec4 words = uvec4(kNotRefined, 0u, 0u, 0u);
+    // A ray inside glass goes from less to more.
+    float side = (frame.flags & kFrameRays) != 0u && rays[pixel.y * frame.tile_width + pixel.x].within > 0.0 ? -1.0 : 1.0;
     // As in refine.comp: one call for all looks.
     for (int i = -kRefineSteps; i < 7; ++i) {
         vec3 away = vec3(0.0);
@@ -68,9 +70,9 @@ void main() {
                 i = -1;
                 continue;
             }
-            float next = refine_next(i + kRefineSteps, t_before, d_before, t, d);
+            float next = refine_next(i + kRefineSteps, t_before, d_before, t, side * d);
             t_before = t;
-            d_before = d;
+            d_before = side * d;
             t = next;
         } else if (i == 0) {
             if (!refine_holds(t_first, t, d)) break;

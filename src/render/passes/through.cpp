@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What lets light through, drawn by the passes of all else: glass bends the rays of a part of the picture, and the frame's own passes draw
-// what the bent rays see, as they drew what the camera sees. One round a surface: who is nearest along the rays as they are (those that rest
-// cost little), what it looks like, where light goes on. Order follows from the rays, so whoever comes first in a list changes nothing.
+// what the bent rays see, as they drew what the camera sees. One step a surface: who is nearest along the rays as they are (those that rest
+// cost little), what it looks like, where light goes on. What is solid where they end is lit once, behind the last step. Order follows from
+// the rays, so whoever comes first in a list changes nothing.
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
 
@@ -11,12 +12,10 @@
 #include "shaders/through_begin.spv.h"
 #include "shaders/through_bend.spv.h"
 #include "shaders/through_end.spv.h"
-#include "shaders/through_enter.spv.h"
 #include "shaders/through_front.spv.h"
 #include "shaders/through_layer.spv.h"
-#include "shaders/through_mirror.spv.h"
-#include "shaders/through_mirrored.spv.h"
 #include "shaders/through_surface.spv.h"
+#include "shaders/through_total.spv.h"
 
 namespace kiln::render {
 
@@ -28,14 +27,11 @@ const Kernel kMarchGlass{"march glass", kMarchGlassSpv};
 const Kernel kThroughBegin{"through begin", kThroughBeginSpv};
 const Kernel kThroughLayer{"through layer", kThroughLayerSpv};
 const Kernel kThroughSurface{"through surface", kThroughSurfaceSpv};
-const Kernel kThroughEnter{"through enter", kThroughEnterSpv};
 const Kernel kThroughBend{"through bend", kThroughBendSpv};
 const Kernel kThroughBendImage{"through bend image", kThroughBendSpv, kWithImage};
 const Kernel kThroughEnd{"through end", kThroughEndSpv};
 const Kernel kThroughFront{"through front", kThroughFrontSpv};
-const Kernel kThroughMirror{"through mirror", kThroughMirrorSpv};
-const Kernel kThroughMirrored{"through mirrored", kThroughMirroredSpv};
-const Kernel kThroughMirroredImage{"through mirrored image", kThroughMirroredSpv, kWithImage};
+const Kernel kThroughTotal{"through total", kThroughTotalSpv};
 const Kernel kShadowGlass{"shadow glass", kShadowGlassSpv};
 const Kernel kMeshTrace{"mesh trace", kMeshTraceSpv};
 
@@ -57,30 +53,21 @@ Image trace_meshes(Graph& g, const TileInputs& in, const Image& visibility, bool
 }
 
 // What is solid along rays that come from a buffer.
-Image fields_along(Graph& g, const TileInputs& in) {
+Image solid_along(Graph& g, const TileInputs& in) {
     TileInputs by_compute = in;  // boxes are of the camera's rays
     by_compute.rt = false;
-    return march(g, by_compute).words;
-}
-
-Image solid_seen_along(Graph& g, const TileInputs& in) {
-    const Image words = fields_along(g, in);
+    const Image words = march(g, by_compute).words;
     return in.has_meshes ? trace_meshes(g, in, words, false) : words;
 }
 
-struct Solid {
-    Image seen, light;
-};
-Solid solid_along(Graph& g, const TileInputs& in) {
-    const Image seen = fields_along(g, in);
+// The light of what was found along them.
+Image light_along(Graph& g, const TileInputs& in, const Image& seen) {
     Image refined = in.refine ? refine(g, in, seen) : seen;
     if (in.refine) refine_instances(g, in, seen, refined);
-    Image words = seen;
-    if (in.has_meshes) words = trace_meshes(g, in, words, false);
-    Surface surface = resolve(g, in, words, refined);
-    resolve_instances(g, in, words, refined, surface);
+    Surface surface = resolve(g, in, seen, refined);
+    resolve_instances(g, in, seen, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
-    return {surface.seen, light(g, in, surface.seen, surface)};
+    return light(g, in, surface.seen, surface);
 }
 
 // Stands for a buffer that a kernel then does not read.
@@ -89,32 +76,33 @@ const Buffer& or_any(const Buffer& buffer, const TileInputs& in) { return buffer
 // The surfaces that rays meet next, of what lets light through before what is solid.
 struct Layer {
     Surface surface;
+    Image nearest;    // that, or what is solid
+    Image lit_words;  // the surface as it was lit
     Image light;
-    Surface lit;  // as it was lit
 };
 Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Image& carried, const ThroughPush& push) {
     TileInputs of_glass = in;
     of_glass.instances = in.instances.of_glass();
-    Image nearest = solid;
+    Layer out;
+    out.nearest = solid;
     if (const InstanceHandles& i = of_glass.instances) {
-        nearest = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+        out.nearest = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
         g.dispatch(
             kMarchGlass, in.size,
             {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-             g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(nearest)},
+             g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out.nearest)},
             InstancePush{.node_count = i.node_count, .first_light = 0, .pad_0 = 0, .pad_1 = 0});
     }
-    if (in.has_blends) nearest = trace_meshes(g, in, nearest, true);
-    Layer out;
+    if (in.has_blends) out.nearest = trace_meshes(g, in, out.nearest, true);
     Image found = g.create("through found", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.seen = g.create("through seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.words = g.create("through surface", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.depth = g.create("through depth", {.size = in.size, .format = rhi::Format::R32Float});
-    g.dispatch(
-        kThroughLayer, in.size,
-        {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(nearest), g.read(carried),
-         g.write(found), g.write(out.surface.seen), g.write(out.surface.words), g.write(out.surface.depth)},
-        push);
+    g.dispatch(kThroughLayer, in.size,
+               {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(out.nearest),
+                g.read(carried), g.write(found), g.write(out.surface.seen), g.write(out.surface.words),
+                g.write(out.surface.depth)},
+               push);
     if (of_glass.instances) {
         Image refined = found;
         if (in.refine) {
@@ -126,109 +114,166 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
     if (in.has_blends) resolve_meshes(g, in, out.surface);
     Surface lit = out.surface;
     lit.words = g.create("through surface lit", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    lit.seen = g.create("through seen lit", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kThroughSurface, in.size,
                {g.read(or_any(in.instances.glass, in)), g.read(out.surface.seen), g.read(out.surface.words),
-                g.write(lit.words)},
+                g.read(in.rays), g.write(lit.words), g.write(lit.seen)},
                push);
+    out.lit_words = lit.words;
     out.light = light(g, in, lit.seen, lit);
-    out.lit = lit;
     return out;
 }
 
-// What is solid in the mirror that glass is, into the light of a layer that the camera's rays met.
-void mirror_solid(Graph& g, const TileInputs& tile, const ThroughPart& part, const TileInputs& in,
-                  const ThroughPush& push, Layer& layer) {
-    Buffer rays = g.create_buffer("through rays mirrored", uint64_t{in.size.width} * in.size.height * sizeof(FrameRay));
-    g.dispatch(kThroughMirror, in.size,
-               {g.uniform(in.frame), g.read(in.rays), g.read(in.instances.instances), g.read(layer.surface.seen),
-                g.read(layer.surface.words), g.write(rays)},
-               push);
-    TileInputs mirrored = in;
-    mirrored.rays = rays;
-    mirrored.frame = part.frame_of_rays;
-    mirrored.light_rects = tile.all_light_rects;
-    mirrored.lights_of_tile = tile.light_count;
-    const Solid solid = solid_along(g, mirrored);
-    Image both = g.create("through light mirrored", {.size = in.size, .format = rhi::Format::Rgba16Float});
-    g.dispatch(
-        in.image_sky ? kThroughMirroredImage : kThroughMirrored, in.size,
-        {g.uniform(in.frame), g.read(in.rays), g.read(in.ggx_table), g.read(in.environment), g.read(layer.lit.seen),
-         g.read(layer.lit.words), g.read(layer.light), g.read(solid.light), g.write(both)},
-        push);
-    layer.light = both;
+// Rays through what is transparent, a pixel each, and how it goes with them.
+struct Ways {
+    TileInputs in;  // size, and rays with their frame once they are not the camera's
+    Image carried;
+    uint32_t step = 0;  // some of kThrough…, in the first step
+};
+// Pixels whose first surface is transparent: what that brought, and what comes through the thing it is of.
+struct First {
+    Surface surface;
+    Image sum, carried;
+};
+struct Brought {
+    Image total;
+    First first;
+    Ways parted;  // with kThroughParts
+};
+
+TileInputs by_rays(const TileInputs& in, const TileInputs& tile, const Block& frame, const Buffer& rays) {
+    TileInputs out = in;
+    out.rays = rays;
+    out.frame = frame;
+    out.light_rects = tile.all_light_rects;
+    out.lights_of_tile = tile.light_count;
+    return out;
+}
+
+// The last of `steps` looks only for what is solid. `solid`: with kThroughCamera what the camera's rays meet, and its light.
+struct Solid {
+    Image seen, light;
+};
+Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways ways, const Solid& solid, int steps) {
+    TileInputs& in = ways.in;
+    const rhi::Extent size = in.size;
+    const uint64_t ray_bytes = uint64_t{size.width} * size.height * sizeof(FrameRay);
+    const bool parts = (ways.step & kThroughParts) != 0;
+    const uint32_t with_parts = parts ? kThroughParts : 0;
+    const rhi::Extent of_parted = parts ? rhi::Extent{size.width, 2 * size.height} : rhi::Extent{1, 1};
+    ThroughPush push{.from_x = 0,
+                     .from_y = 0,
+                     .width = int(size.width),
+                     .height = int(size.height),
+                     .step = 0,
+                     .pad_0 = 0,
+                     .pad_1 = 0,
+                     .pad_2 = 0};
+    Buffer rays_ended = g.create_buffer("through rays ended", ray_bytes);
+    Image seen_ended = g.create("through seen ended", {.size = size, .format = rhi::Format::Rgba32Uint});
+    Buffer rays_parted = g.create_buffer("through rays parted", parts ? 2 * ray_bytes : sizeof(FrameRay));
+    Image carried_parted = g.create("through carried parted", {.size = of_parted, .format = rhi::Format::Rgba16Float});
+    Image carried = ways.carried, sum = ways.carried;
+    Brought out;
+    for (int i = 0; i <= steps; ++i) {
+        push.step = (i == 0 ? ways.step | kThroughBegins : with_parts) | (i == steps ? kThroughLast : 0);
+        const bool of_camera = (push.step & kThroughCamera) != 0;
+        const Image solid_seen = of_camera ? solid.seen : solid_along(g, in);
+        Layer layer{
+            {solid_seen, solid.light, solid_seen}, solid_seen, solid_seen, solid.light};  // not read in the last
+        if (i < steps) layer = layer_along(g, in, solid_seen, carried, push);
+        Buffer rays = g.create_buffer("through rays", ray_bytes);
+        Image carried_now = g.create("through carried", {.size = size, .format = rhi::Format::Rgba16Float});
+        Image sum_now = g.create("through sum", {.size = size, .format = rhi::Format::Rgba16Float});
+        g.dispatch(in.image_sky ? kThroughBendImage : kThroughBend, size,
+                   {g.uniform(in.frame),
+                    g.read(in.rays),
+                    g.read(or_any(in.instances.instances, in)),
+                    g.read(or_any(in.instances.glass, in)),
+                    g.read(in.ggx_table),
+                    g.read(in.environment),
+                    g.read(layer.surface.seen),
+                    g.read(layer.surface.words),
+                    g.read(layer.lit_words),
+                    g.read(layer.light),
+                    g.read(layer.nearest),
+                    g.read(solid_seen),
+                    g.read(solid.light),
+                    g.read(carried),
+                    g.read(sum),
+                    g.write(rays),
+                    g.write(carried_now),
+                    g.write(sum_now),
+                    g.write(rays_ended),
+                    g.write(seen_ended),
+                    g.write(rays_parted),
+                    g.write(carried_parted)},
+                   push);
+        carried = carried_now;
+        sum = sum_now;
+        if (i == 0) out.first = {layer.surface, sum, carried};
+        if (i == 1 && parts) out.first.carried = carried;  // glass has two surfaces
+        in = by_rays(in, tile, frame_of_rays, rays);
+    }
+    in.rays = rays_ended;
+    out.total = g.create("through total", {.size = size, .format = rhi::Format::Rgba16Float});
+    g.dispatch(kThroughTotal, size,
+               {g.read(sum), g.read(carried), g.read(light_along(g, in, seen_ended)), g.write(out.total)}, push);
+    out.parted.in = in;
+    out.parted.in.size = of_parted;
+    out.parted.in.rays = rays_parted;
+    out.parted.carried = carried_parted;
+    return out;
 }
 
 bool wants_front(const TileInputs& in) { return in.taa || in.particles.count > 0; }
 
+// Surfaces of glass come in twos; some more for rays that glass throws back inside.
+constexpr int kMoreSteps = 4;
+constexpr int kStepsOfParted = 6;
+
 void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const Surface& surface, Image& radiance,
                Front& front) {
-    TileInputs in = tile;
+    Ways ways;
+    ways.in = tile;
+    TileInputs& in = ways.in;
     in.size = part.size;
     in.frame = part.frame;
     in.light_rects = part.light_rects;
     in.lights_of_tile = part.lights_of_tile;
     in.volume_count = 0;  // bent rays see no solids of lights as the rasteriser draws them
+    const bool parts = in.instances.glass_node_count > 0 && tile.transparent_layers > 0;
     ThroughPush push{.from_x = part.x,
                      .from_y = part.y,
                      .width = int(part.size.width),
                      .height = int(part.size.height),
-                     .passed = 0,
-                     .last = 0,
+                     .step = parts ? kThroughParts : 0,
                      .pad_0 = 0,
-                     .pad_1 = 0};
+                     .pad_1 = 0,
+                     .pad_2 = 0};
     Solid solid;
     solid.seen = g.create("through solid", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     solid.light = g.create("through solid light", {.size = in.size, .format = rhi::Format::Rgba16Float});
     g.dispatch(kThroughBegin, in.size,
                {g.read(surface.seen), g.read(radiance), g.write(solid.seen), g.write(solid.light)}, push);
-    Image carried = solid.light, sum = solid.light;  // not read in the first round
-    const Image distances = in.field.distances;
-    for (int passed = 0; passed <= tile.transparent_layers; ++passed) {
-        push.passed = uint32_t(passed);
-        push.last = passed == tile.transparent_layers ? 1 : 0;
-        if (passed > 0) solid = solid_along(g, in);
-        Layer layer{{solid.seen, solid.light, solid.seen}, solid.light, {}};  // not read in the last round
-        if (push.last == 0) layer = layer_along(g, in, solid.seen, carried, push);
-        if (passed == 0 && push.last == 0 && in.has_glass) mirror_solid(g, tile, part, in, push, layer);
-        Buffer rays = g.create_buffer("through rays", uint64_t{part.size.width} * part.size.height * sizeof(FrameRay));
-        Image carried_now = g.create("through carried", {.size = in.size, .format = rhi::Format::Rgba16Float});
-        Image sum_now = g.create("through sum", {.size = in.size, .format = rhi::Format::Rgba16Float});
-        const InstanceHandles& i = in.instances;
-        TileInputs inside = in;
-        Image seen_inside = solid.seen;
-        if (push.last == 0 && i.glass_node_count > 0) {
-            Buffer entered = g.create_buffer("through rays inside", rays.size);
-            g.dispatch(kThroughEnter, in.size,
-                       {g.uniform(in.frame), g.read(in.rays), g.read(i.instances), g.read(i.glass),
-                        g.read(layer.surface.seen), g.read(layer.surface.words), g.write(entered)},
-                       push);
-            inside.rays = entered;
-            inside.frame = part.frame_of_rays;
-            seen_inside = solid_seen_along(g, inside);
-        }
-        g.dispatch(in.image_sky ? kThroughBendImage : kThroughBend, in.size,
-                   {g.uniform(in.frame), g.read(in.rays), g.read(or_any(i.instances, in)), g.read(or_any(i.sets, in)),
-                    g.read(or_any(i.cells, in)), g.read(or_any(i.glass, in)), g.read(distances),
-                    g.read(layer.surface.seen), g.read(layer.surface.words), g.read(layer.light), g.read(solid.light),
-                    g.read(carried), g.read(sum), g.read(inside.rays), g.read(seen_inside), g.write(rays),
-                    g.write(carried_now), g.write(sum_now), g.read(in.environment)},
-                   push);
-        carried = carried_now;
-        sum = sum_now;
-        if (passed == 0 && wants_front(tile)) {
-            push.passed = 1;  // over what is there
-            g.dispatch(
-                kThroughFront, in.size,
-                {g.read(layer.surface.seen), g.read(layer.surface.depth), g.read(sum), g.read(carried),
-                 g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light), g.write(front.left)},
-                push);
-        }
-        in.rays = rays;
-        in.frame = part.frame_of_rays;
-        in.light_rects = tile.all_light_rects;
-        in.lights_of_tile = tile.light_count;
+    ways.carried = solid.light;  // not read
+    ways.step = kThroughCamera | push.step;
+    const int steps = parts ? 2 * tile.transparent_layers + kMoreSteps : tile.transparent_layers;
+    Brought brought = bring(g, tile, part.frame_of_rays, ways, solid, steps);
+    Image parted = brought.total;
+    if (parts) {
+        brought.parted.in.frame = part.frame_of_parted;
+        parted = bring(g, tile, part.frame_of_parted, brought.parted, solid, std::min(steps, kStepsOfParted)).total;
     }
-    g.dispatch(kThroughEnd, in.size, {g.read(sum), g.write(radiance)}, push);
+    if (wants_front(tile)) {
+        const First& first = brought.first;
+        g.dispatch(kThroughFront, in.size,
+                   {g.read(first.surface.seen), g.read(first.surface.depth), g.read(first.sum), g.read(first.carried),
+                    g.read(parted), g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light),
+                    g.write(front.left)},
+                   push);
+    }
+    g.dispatch(kThroughEnd, in.size, {g.read(brought.total), g.read(parted), g.write(radiance)}, push);
 }
 
 }  // namespace
@@ -245,13 +290,13 @@ Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image
                               .from_y = 0,
                               .width = int(in.size.width),
                               .height = int(in.size.height),
-                              .passed = 0,
-                              .last = 0,
+                              .step = kThroughBegins,
                               .pad_0 = 0,
-                              .pad_1 = 0};
+                              .pad_1 = 0,
+                              .pad_2 = 0};
         g.dispatch(
             kThroughFront, in.size,
-            {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance),
+            {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance), g.read(radiance),
              g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light), g.write(front.left)},
             all);
     }
@@ -278,13 +323,12 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
 
 void through_kernels(const TileInputs& in, std::vector<const Kernel*>& out) {
     if (!in.has_glass && !in.has_blends) return;
-    out.insert(out.end(), {&kThroughBegin, &kThroughLayer, &kThroughSurface, &kThroughEnter,
-                           in.image_sky ? &kThroughBendImage : &kThroughBend, &kThroughEnd});
+    out.insert(out.end(), {&kThroughBegin, &kThroughLayer, &kThroughSurface,
+                           in.image_sky ? &kThroughBendImage : &kThroughBend, &kThroughTotal, &kThroughEnd});
     if (in.taa || in.has_particles) out.push_back(&kThroughFront);
     if (in.has_meshes) out.push_back(&kMeshTrace);
     if (!in.has_glass) return;
-    out.insert(out.end(), {&kShadowGlass, &kThroughMirror, in.image_sky ? &kThroughMirroredImage : &kThroughMirrored});
-    out.insert(out.end(), {&kMarchGlass, &kResolveInstances});
+    out.insert(out.end(), {&kShadowGlass, &kMarchGlass, &kResolveInstances});
     if (in.refine) out.push_back(&specialised(kRefineInstances, in.use_of_instances));
 }
 

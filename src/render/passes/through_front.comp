@@ -12,20 +12,24 @@ layout(set = 0, binding = 0) uniform utexture2D seen;
 layout(set = 0, binding = 1) uniform texture2D depth;
 layout(set = 0, binding = 2) uniform texture2D light;
 layout(set = 0, binding = 3) uniform texture2D left;
-layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D front_seen;
-layout(set = 0, binding = 5, r32f) writeonly uniform image2D front_depth;
-layout(set = 0, binding = 6, rgba16f) writeonly uniform image2D front_light;
-layout(set = 0, binding = 7, rgba16f) writeonly uniform image2D front_left;
+layout(set = 0, binding = 4) uniform texture2D mirrored;  // with kThroughParts: belongs to the light
+layout(set = 0, binding = 5, rgba32ui) writeonly uniform uimage2D front_seen;
+layout(set = 0, binding = 6, r32f) writeonly uniform image2D front_depth;
+layout(set = 0, binding = 7, rgba16f) writeonly uniform image2D front_light;
+layout(set = 0, binding = 8, rgba16f) writeonly uniform image2D front_left;
 layout(push_constant) uniform Push { ThroughPush push; };
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= push.width || pixel.y >= push.height) return;
     uvec4 word = texelFetch(seen, pixel, 0);
-    if (push.passed > 0u && (word.y >> 28u) == kSeenNothing) return;
+    // A part goes over what is there.
+    if ((push.step & kThroughBegins) == 0u && (word.y >> 28u) == kSeenNothing) return;
+    vec4 own = texelFetch(light, pixel, 0);
+    if ((push.step & kThroughParts) != 0u) own.rgb += texelFetch(mirrored, pixel, 0).rgb;
     ivec2 to = pixel + ivec2(push.from_x, push.from_y);
     imageStore(front_seen, to, word);
     imageStore(front_depth, to, vec4(texelFetch(depth, pixel, 0).r));
-    imageStore(front_light, to, texelFetch(light, pixel, 0));
+    imageStore(front_light, to, own);
     imageStore(front_left, to, texelFetch(left, pixel, 0));
 }

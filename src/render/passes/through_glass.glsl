@@ -12,11 +12,11 @@ vec3 towards(vec3 n, vec3 d) {
 }
 
 // A ray that starts at `at`, counted from the eye in finest voxels.
-FrameRay frame_ray(vec3 at, vec3 direction) {
+FrameRay frame_ray(vec3 at, vec3 direction, float within) {
     vec3 part = vec3(frame.eye_part_x, frame.eye_part_y, frame.eye_part_z) + at;
     ivec3 whole = ivec3(floor(part));
     part -= vec3(whole);
-    return FrameRay(frame.eye_x + whole.x, frame.eye_y + whole.y, frame.eye_z + whole.z, 0.0, part.x, part.y, part.z, 0.0, direction.x, direction.y, direction.z, 0.0);
+    return FrameRay(frame.eye_x + whole.x, frame.eye_y + whole.y, frame.eye_z + whole.z, within, part.x, part.y, part.z, 0.0, direction.x, direction.y, direction.z, 0.0);
 }
 
 // One that meets nothing: from above everything, upwards.

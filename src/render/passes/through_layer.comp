@@ -27,7 +27,7 @@ void main() {
     bool through = false;
     if (state == kSeenInstance) through = glass[word.y & 0x0fffffffu].ior > 0.0;
     if (state == kSeenMesh) through = (mesh_parts[word.z].flags & kMeshBlend) != 0u;
-    if (push.passed > 0u && texelFetch(carried, pixel, 0).a != kRayGoes) through = false;
+    if ((push.step & kThroughCamera) == 0u && texelFetch(carried, pixel, 0).a == kRayRests) through = false;
     if (!through) word = uvec4(0x7f800000u, kSeenNothing << 28u, 0u, 0u);
     imageStore(found, pixel, word);
     imageStore(seen, pixel, word);

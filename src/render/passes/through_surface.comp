@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// The surface of glass as the light pass is to see it: it reflects as its index of refraction says, and the share that stays outside looks
+// The surface of glass as the light pass is to see it, where rays come from outside: it reflects as its index of refraction says, and the share that stays outside looks
 // like its base colour. A G-buffer has albedo a and metallic m, which make a base of a (1 - m) and a reflectance of 0.04 (1 - m) + a m; both
 // are wanted, so m follows from a quadratic equation.
 #extension GL_GOOGLE_include_directive : require
@@ -14,7 +14,9 @@ layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 layout(set = 0, binding = 0, std430) readonly buffer Glass { GlassRecord glass[]; };  // not read without glass
 layout(set = 0, binding = 1) uniform utexture2D seen;
 layout(set = 0, binding = 2) uniform utexture2D words;
-layout(set = 0, binding = 3, rgba32ui) writeonly uniform uimage2D words_now;
+layout(set = 0, binding = 3, std430) readonly buffer Rays { FrameRay rays[]; };  // not read with kThroughCamera
+layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D words_now;
+layout(set = 0, binding = 5, rgba32ui) writeonly uniform uimage2D seen_now;
 layout(push_constant) uniform Push { ThroughPush push; };
 
 #include "render/passes/surface.glsl"
@@ -37,5 +39,7 @@ void main() {
         s.metallic = 1.0 - rest;
         packed_surface = pack_surface(s);
     }
+    bool inside = (push.step & kThroughCamera) == 0u && rays[pixel.y * push.width + pixel.x].within > 0.0 && (word.y >> 28u) == kSeenInstance;
     imageStore(words_now, pixel, packed_surface);
+    imageStore(seen_now, pixel, inside ? uvec4(0x7f800000u, kSeenNothing << 28u, 0u, 0u) : word);
 }
