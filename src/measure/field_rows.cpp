@@ -360,8 +360,9 @@ private:
         }
     }
 
-    // What an edit costs among so many others that lie as close together as the scene's do: the scene's recipe in a larger box, of which the
-    // grid covers the middle, kAmongHalf to each side.
+    // What an edit costs among so many others that lie as close together as the scene's do: the scene, and round it others of its kind, each in
+    // the cube beside. So what an edit of edit.mean finds where it bites is there in every row, whatever the kind; a larger recipe would not do:
+    // the crowd of kind 2 is densest in its middle, and less so a scene's size away from it. The grid covers kAmongHalf to each side.
     struct Among {
         const char* name;
         uint32_t count;
@@ -370,11 +371,32 @@ private:
         {"edit.among.10k", 10000}, {"edit.among.100k", 100000}, {"edit.among.1m", 1000000}};
     static constexpr float kAmongHalf = 2;
 
-    void among(const char* name, uint32_t count, int threads) {
+    // Middles of `count` cubes of side 2, the nearest to the origin first.
+    static std::vector<vec3> cube_middles(uint32_t count) {
+        const int reach = int(std::ceil(std::cbrt(float(count)))) / 2 + 1;
+        std::vector<vec3> out;
+        for (int z = -reach; z <= reach; ++z) {
+            for (int y = -reach; y <= reach; ++y) {
+                for (int x = -reach; x <= reach; ++x) out.push_back({2 * float(x), 2 * float(y), 2 * float(z)});
+            }
+        }
+        std::ranges::stable_sort(out, {}, [](vec3 p) { return dot(p, p); });
+        out.resize(count);
+        return out;
+    }
+
+    void among(const char* name, uint32_t wanted_count, int threads) {
         run_.stage(name);
-        std::vector<Edit> edits = recipe(kind_, run_.options.seed, count);
-        const float wider = std::cbrt(float(count) / 1000);
-        for (Edit& e : edits) e.node.transform.position = e.node.transform.position * wider;
+        const uint32_t scenes = std::max(1u, wanted_count / std::max(1u, run_.options.count));
+        std::vector<Edit> edits;
+        uint32_t seed = run_.options.seed;
+        for (const vec3 middle : cube_middles(scenes)) {
+            for (Edit& e : recipe(kind_, seed++, run_.options.count)) {
+                e.node.transform.position = e.node.transform.position + middle;
+                edits.push_back(e);
+            }
+        }
+        const uint32_t count = uint32_t(edits.size());
         field::FieldOptions options;
         options.voxel_size = float(voxel());
         options.bounds = {{-kAmongHalf, -kAmongHalf, -kAmongHalf}, {kAmongHalf, kAmongHalf, kAmongHalf}};
