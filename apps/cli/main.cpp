@@ -16,9 +16,10 @@
 namespace kiln::cli {
 namespace {
 
-constexpr std::string_view kVerbs[] = {"demo",   "render", "query",   "import", "export", "inspect", "validate",
-                                       "schema", "doctor", "compare", "diff",   "new",    "bench",   "simulate"};
-constexpr std::string_view kLaterVerbs[] = {"view", "edit"};
+constexpr std::string_view kVerbs[] = {"demo",    "render",   "query",  "import",   "export",
+                                       "inspect", "validate", "schema", "doctor",   "compare",
+                                       "diff",    "new",      "bench",  "simulate", "view"};
+constexpr std::string_view kLaterVerbs[] = {"edit"};
 
 // In the list of verbs only the first line of each description; its own help shows all of it.
 class Help : public CLI::Formatter {
@@ -61,7 +62,7 @@ int run(int argc, char** argv) {
     CLI::App app(
         "Kiln, a game engine whose worlds are signed distance fields.\n\n"
         "Examples:\n"
-        "  kiln demo                                    a first picture\n"
+        "  kiln demo                                    a window on the quarry, or a first picture\n"
         "  kiln render potter -o potter.png             a bundled scene, or a NAME.kiln.json file\n"
         "  kiln query potter --points points.csv        distances, normals and materials\n"
         "  kiln validate my.kiln.json                   errors with line and column",
@@ -84,6 +85,7 @@ int run(int argc, char** argv) {
     add_export(app, verb);
     add_bench(app, verb);
     add_simulate(app, verb);
+    add_view(app, verb);
     try {
         app.parse(argc, argv);
     } catch (const CLI::ParseError& e) {

@@ -11,7 +11,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <vector>
 
 namespace kiln::cli {
@@ -27,6 +26,12 @@ constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "s
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
 }  // namespace
+
+std::optional<Quality> quality_named(std::string_view name) {
+    const auto found = std::find(std::begin(kQualities), std::end(kQualities), name) - std::begin(kQualities);
+    if (found > ptrdiff_t(Quality::Ultra)) return std::nullopt;
+    return Quality(found);
+}
 
 Result<RenderSettings> picture_settings(const PictureOptions& o) {
     RenderSettings s;
@@ -119,8 +124,7 @@ int pictures_of_one_view(const RenderSettings& s) { return int(std::ceil(16 / (s
 
 std::string_view choose_quality(const PictureOptions& o, const Renderer& renderer, RenderSettings& s) {
     if (o.quality.empty()) return kQualities[size_t(Quality::High)];
-    const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality) - std::begin(kQualities);
-    const Quality quality = o.quality == "auto" ? renderer.best_quality() : Quality(found);
+    const Quality quality = quality_named(o.quality).value_or(renderer.best_quality());
     const MeshShadows asked = s.mesh_shadows;
     set_quality(s, quality);
     if (!o.shadows.empty()) s.mesh_shadows = asked;
@@ -155,9 +159,7 @@ void introduce(const RenderStats& stats) {
         kind = (d.kind == "cpu" ? std::string(", a CPU renderer") : "") + ", " + d.api_version;
         break;
     }
-    const bool display = std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY");
-    say("kiln " + std::string(version()) + " — device: " + stats.device + kind +
-        (display ? "; windows come with a later version" : "; no display found") + " → rendering to a file");
+    say("kiln " + std::string(version()) + " — device: " + stats.device + kind + "; no window → rendering to a file");
 }
 
 // One object a level, finest first.

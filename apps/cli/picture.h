@@ -5,6 +5,7 @@
 #include <kiln/renderer.h>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -34,6 +35,8 @@ int render_picture(const PictureOptions& options);
 
 // Parts of it, for sequences of other verbs.
 
+/// Of a word for --quality but "auto".
+std::optional<Quality> quality_named(std::string_view name);
 /// What the options mean, or which of them means nothing.
 Result<RenderSettings> picture_settings(const PictureOptions& options);
 /// Sets what --quality asks for; answers its name, "auto" as what it became.

@@ -25,5 +25,6 @@ void add_new(CLI::App& app, Run& run);
 void add_export(CLI::App& app, Run& run);
 void add_bench(CLI::App& app, Run& run);
 void add_simulate(CLI::App& app, Run& run);
+void add_view(CLI::App& app, Run& run);
 
 }  // namespace kiln::cli

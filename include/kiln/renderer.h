@@ -7,6 +7,8 @@
 #include <kiln/math.h>
 #include <kiln/result.h>
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -176,7 +178,8 @@ struct RenderSettings {
     LightTechnique lighting = LightTechnique::Clusters;
     float scale =
         1;  ///< below 1, with taa: rays a pixel along each side, [0.25, 1]; the picture is made whole over time
-    int shadow_map_side = 0;  ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
+    int shadow_map_side = 0;   ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
+    bool shown_alone = false;  ///< of a shaded picture only `srgb` is brought from the device, for whoever shows it
 };
 
 /// What a picture may cost. Low: hard shadows, of meshes by maps, surfaces as the bricks have them. Medium: the same shadows. High: everything that one picture can
@@ -195,6 +198,8 @@ struct Picture {
     /// Writes .png (srgb) or .exr (rgba as half; the depth view as 32-bit float). The file appears whole or not at all.
     Result<void> save(const std::string& path) const;
     View view = View::Shaded;
+    /// `srgb` in so many pixels, blended where it is stretched; nothing else.
+    Picture stretched(int to_width, int to_height) const;
 };
 
 /// What one render cost.
@@ -252,9 +257,25 @@ struct DeviceInfo {
     bool mesh_shader = false, rt_pipeline = false;  ///< tiers beside compute
 };
 
+/// What a window system gives a renderer that is to show pictures in one of its windows. SDL: SDL_Vulkan_GetInstanceExtensions() and
+/// SDL_Vulkan_CreateSurface(); the renderer itself knows no window system.
+struct WindowSurface {
+    std::vector<std::string> extensions;  ///< of the graphics interface, by name
+    /// A surface of the window for a VkInstance: a VkSurfaceKHR as a number, 0 where there can be none. The renderer destroys it.
+    std::function<uint64_t(void* instance)> make;
+};
+
+/// What became of a picture that was to be shown in a window.
+enum class Shown : uint8_t {
+    Yes,
+    Hidden,  ///< the window has no pixels now
+    Later,   ///< the window system is not ready for another one
+};
+
 struct RendererOptions {
     std::string device = "auto";  ///< "auto", "cpu-vulkan", or part of a device's name
     bool validation = false;      ///< Vulkan validation layer; its first message fails the call that caused it
+    std::optional<WindowSurface> window{};  ///< none: pictures are not shown, only made
 };
 
 /// Owner's thread only.
@@ -266,6 +287,9 @@ public:
     ~Renderer();
 
     Result<Picture> render(const Frame& frame, const RenderSettings& settings = {});
+    /// Shows a picture's `srgb` in the renderer's window of so many pixels, stretched to fit. A resized window, or one that lost its surface,
+    /// is set up again on the way. `wait`: for the screen's refresh, else the newest picture is shown at each.
+    Result<Shown> show(const Picture& picture, int window_width, int window_height, bool wait = true);
     /// Of the last render().
     const RenderStats& stats() const;
     /// What suits the device: Medium on a processor, High where graphics are built into one, Ultra on a card.

@@ -241,6 +241,13 @@ struct PlayLines {
     bool contacts = false;  ///< a short line along the normal of each contact
 };
 
+/// How much goes on in a play.
+struct PlayCounts {
+    int bodies = 0;  ///< that can move, loose parts among them
+    int awake = 0;   ///< of those
+    int parts = 0;   ///< that have come loose since the start
+};
+
 /// A world's bodies, running, while the world itself stays as it is. It must outlive the play. Owner's thread.
 ///   auto play = kiln::Play::start(world);   play->advance(seconds);   renderer->render(*play->frame(camera));
 class Play {
@@ -265,7 +272,14 @@ public:
     Result<void> keep(World& world) const;
     /// The world with its bodies where they are: after step() those of the last step, after advance() as far between the last two as time
     /// has gone on. Each frame moves on from the one before (motion).
-    Result<Frame> frame(const Camera& camera, const PlayLines& lines = {});
+    /// `budget`: of a world of several levels, what the picture may bake.
+    Result<Frame> frame(const Camera& camera, const PlayLines& lines = {}, const FrameBudget& budget = {});
+    /// A new body of one edit, which goes off at `velocity` (m/s) with the next step. It is like a part that came loose: it settles, and
+    /// keep() has it. Its name is made up.
+    Result<void> launch(Edit edit, vec3 velocity);
+    /// What a ray meets of the world as the last frame showed it, bodies among it.
+    Result<RayHit> cast(const Ray& ray);
+    PlayCounts counts() const;
 
 private:
     friend class World;

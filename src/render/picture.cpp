@@ -21,6 +21,14 @@ float float_from_half(uint16_t half) {
     return std::bit_cast<float>(sign | ((size << 13) + 0x38000000u));
 }
 
+void place_shown(Picture& picture, int x, int y, int width, int height, std::span<const std::byte> shown) {
+    const size_t row = size_t(width) * 4;
+    KILN_ASSERT(shown.size() == row * size_t(height));
+    for (size_t j = 0; j < size_t(height); ++j)
+        std::memcpy(picture.srgb.data() + ((size_t(y) + j) * size_t(picture.width) + size_t(x)) * 4,
+                    shown.data() + j * row, row);
+}
+
 void place_tile(Picture& picture, int x, int y, int width, int height, std::span<const std::byte> radiance,
                 std::span<const std::byte> shown, std::span<const float> depth) {
     const size_t row = size_t(width);

@@ -24,6 +24,7 @@
 #include "render/passes/lamps.h"
 #include "render/passes/refine.gpu.h"
 #include "render/picture.h"
+#include "render/presenter.h"
 #include "render/through_rects.h"
 #include "render/temporal.h"
 #include "rhi/create.h"
@@ -55,9 +56,10 @@ struct Renderer::Impl {
     std::unique_ptr<GpuField> field;
     std::unique_ptr<GpuInstances> instances;
     std::unique_ptr<GpuMeshes> meshes;
-    std::unique_ptr<GpuBoxes> boxes;    // once a frame asked for the tier
-    std::unique_ptr<LiveShaders> live;  // where KILN_LIVE_SHADERS asks for it
-    std::string fault;                  // first message of the device since the last call
+    std::unique_ptr<GpuBoxes> boxes;       // once a frame asked for the tier
+    std::unique_ptr<LiveShaders> live;     // where KILN_LIVE_SHADERS asks for it
+    std::unique_ptr<Presenter> presenter;  // where there is a window
+    std::string fault;                     // first message of the device since the last call
     rhi::BufferHandle ggx_table;
     rhi::BufferHandle environment;
     rhi::BufferHandle exposure;
@@ -77,6 +79,7 @@ struct Renderer::Impl {
     std::vector<LineRecord> lines;  // likewise
 
     ~Impl() {
+        presenter.reset();
         instances.reset();
         boxes.reset();
         field.reset();
@@ -512,8 +515,6 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
     const TileResult tile =
         on_host ? record_tile(g, in, settings.view, visibility, refined, mesh_ids) : record_tile(g, in, settings.view);
     if (auto done = run(g, tile.evaluations, tile.mesh_numbers); !done) return done;
-    auto radiance = tile.radiance.get();
-    if (!radiance) return radiance.error();
     std::vector<std::byte> shown;
     if (settings.view != View::Shaded || in.develops) {
         auto bytes = tile.shown.get();
@@ -525,6 +526,12 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         if (!state) return state.error();
         eye = state->front();
     }
+    if (settings.shown_alone && settings.view == View::Shaded && in.develops) {
+        place_shown(picture, params.tile_x, params.tile_y, int(in.shown_size.width), int(in.shown_size.height), shown);
+        return {};
+    }
+    auto radiance = tile.radiance.get();
+    if (!radiance) return radiance.error();
     auto depth = tile.depth.get_as<float>();
     if (!depth) return depth.error();
     place_tile(picture, params.tile_x, params.tile_y, int(in.shown_size.width), int(in.shown_size.height), *radiance,
@@ -655,9 +662,12 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
     picture.height = settings.height;
     picture.view = settings.view;
     const size_t pixels = size_t(settings.width) * size_t(settings.height);
-    picture.rgba.resize(pixels * 4);
+    const bool shown_alone = settings.shown_alone && settings.view == View::Shaded && switches.develops;
     picture.srgb.resize(pixels * 4);
-    picture.depth.resize(pixels);
+    if (!shown_alone) {
+        picture.rgba.resize(pixels * 4);
+        picture.depth.resize(pixels);
+    }
     const auto [tile_width, tile_height] = tile_size(settings, frame.lights.size());  // with taa one, of all rays
     const auto [across, down] = rays_of(settings);
     if (!frame.camera.auto_exposure) eye = measured_exposure({}, frame.camera, 0, {});
@@ -730,11 +740,15 @@ Renderer& Renderer::operator=(Renderer&&) noexcept = default;
 Renderer::~Renderer() = default;
 
 Result<Renderer> Renderer::create(const RendererOptions& options) {
-    auto device = rhi::create_device({.device = options.device, .validation = options.validation});
+    rhi::WindowSystem window;
+    if (options.window) window = {options.window->extensions, options.window->make};
+    auto device = rhi::create_device(
+        {.device = options.device, .validation = options.validation, .window = options.window ? &window : nullptr});
     if (!device) return device.error();
     auto impl = std::make_unique<Impl>();
     impl->device = std::move(*device);
     if (auto ready = impl->prepare(); !ready) return ready.error();
+    if (options.window) impl->presenter = std::make_unique<Presenter>(*impl->device, *options.window);
     auto live = LiveShaders::from_environment();
     if (!live) return live.error();
     impl->live = std::move(*live);
@@ -743,6 +757,16 @@ Result<Renderer> Renderer::create(const RendererOptions& options) {
 
 Result<Picture> Renderer::render(const Frame& frame, const RenderSettings& settings) {
     return impl_->render(frame, settings);
+}
+
+Result<kiln::Shown> Renderer::show(const Picture& picture, int window_width, int window_height, bool wait) {
+    if (!impl_->presenter)
+        return Error{"show: the renderer was made without a window (RendererOptions::window)", ErrorKind::Usage};
+    impl_->fault.clear();
+    auto shown = impl_->presenter->show(picture, window_width, window_height, wait);
+    if (!shown) return shown;
+    if (auto ok = impl_->healthy(); !ok) return ok.error();
+    return shown;
 }
 
 const RenderStats& Renderer::stats() const { return impl_->stats; }

@@ -13,7 +13,7 @@ namespace {
 Result<std::unique_ptr<Device>> create_backend(const DeviceOptions& options) {
     if (options.backend == "null") return std::unique_ptr<Device>(std::make_unique<null::NullDevice>());
     if (options.backend == "vulkan") {
-        auto instance = vulkan::Instance::create(options.validation);
+        auto instance = vulkan::Instance::create(options.validation, options.window);
         if (!instance) return instance.error();
         auto adapter = (*instance)->choose(options.device);
         if (!adapter) return adapter.error();

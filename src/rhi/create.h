@@ -12,7 +12,8 @@ struct DeviceOptions {
     std::string device = "auto";
     bool validation =
         false;  // wrap in the validate decorator and switch on the driver's own validation layer if present
-    bool pipeline_cache = true;  // keep compiled pipelines in $XDG_CACHE_HOME/kiln
+    bool pipeline_cache = true;            // keep compiled pipelines in $XDG_CACHE_HOME/kiln
+    const WindowSystem* window = nullptr;  // where given, only devices that can show pictures in its window fit
 };
 
 // Error of kind NoDevice when there is none that fits: says which there are and what to install.

@@ -49,6 +49,7 @@ public:
     virtual Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) = 0;
     virtual Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) = 0;
     virtual Result<QuerySet> create_query_set(const QuerySetDesc& desc) = 0;
+    virtual Result<SurfaceHandle> create_surface(const SurfaceDesc& desc) = 0;
 
     virtual void destroy(HeapHandle handle) = 0;
     virtual void destroy(BufferHandle handle) = 0;
@@ -63,6 +64,7 @@ public:
     virtual void destroy(RenderPipeline handle) = 0;
     virtual void destroy(TracePipeline handle) = 0;
     virtual void destroy(QuerySet handle) = 0;
+    virtual void destroy(SurfaceHandle handle) = 0;  // waits for the GPU
 
     // ---- what an object is
     // The view of the whole texture that every texture comes with; it goes with the texture.
@@ -99,6 +101,13 @@ public:
     // Bytes of an Upload or Readback buffer; valid until unmap. Readback: wait for the copying submit first.
     virtual Result<std::span<std::byte>> map(BufferHandle buffer) = 0;
     virtual void unmap(BufferHandle buffer) = 0;
+
+    // ---- windows. configure() a surface once its window has a size. Then for each picture: acquire(), write_texture() with
+    // `after` = Access::Present, submit(), present().
+    virtual Result<SurfaceState> configure(SurfaceHandle surface, const SurfaceSettings& settings) = 0;
+    // Waits for a free texture a tenth of a second at most.
+    virtual Result<SurfaceImage> acquire(SurfaceHandle surface) = 0;
+    virtual Result<SurfaceState> present(SurfaceHandle surface) = 0;
 
     // ---- health
     virtual MemoryStats memory_stats() const = 0;

@@ -22,9 +22,10 @@ enum class Format : uint8_t {
     Rgba32Uint,
     R11g11b10Float,
     Depth32Float,
-    Rgba8Srgb,  // decoded to linear before filtering; sampled and copied only
+    Rgba8Srgb,   // decoded to linear before filtering; sampled and copied only
+    Bgra8Unorm,  // as many windows have it; copied only
 };
-constexpr int kFormatCount = 15;
+constexpr int kFormatCount = 16;
 
 // How a shader sees a texel.
 enum class SampleType : uint8_t { Float, Uint, Depth };

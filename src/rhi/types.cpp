@@ -17,7 +17,7 @@ constexpr FormatInfo kFormats[kFormatCount] = {
     {"Rgba8Unorm", 4, 4, Float, true, true},      {"Rgba16Float", 8, 4, Float, true, true},
     {"Rgba32Float", 16, 4, Float, false, true},   {"Rgba32Uint", 16, 4, Uint, false, true},
     {"R11g11b10Float", 4, 3, Float, true, false}, {"Depth32Float", 4, 1, Depth, false, false},
-    {"Rgba8Srgb", 4, 4, Float, true, false},
+    {"Rgba8Srgb", 4, 4, Float, true, false},      {"Bgra8Unorm", 4, 4, Float, true, false},
 };
 
 constexpr std::string_view kAccessNames[] = {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -40,6 +41,7 @@ using ComputePipeline = Handle<struct ComputePipelineTag>;
 using RenderPipeline = Handle<struct RenderPipelineTag>;
 using TracePipeline = Handle<struct TracePipelineTag>;
 using QuerySet = Handle<struct QuerySetTag>;
+using SurfaceHandle = Handle<struct SurfaceTag>;  // what a window shows
 
 // Number of a submission to the queue; later ones are larger. 0 is "none", always completed.
 using SubmitId = uint64_t;
@@ -374,6 +376,44 @@ struct TracePipelineDesc {
 struct QuerySetDesc {
     uint32_t count = 0;  // timestamps
     std::string_view label = {};
+};
+
+// ---- windows ---------------------------------------------------------------------------------------------------
+
+// What a window system gives a device that is to draw into its windows; this module knows none of them.
+struct WindowSystem {
+    std::vector<std::string> extensions = {};  // of Vulkan's instance
+    // A VkSurfaceKHR of the window, as a number, for the VkInstance given; 0 where it cannot be made. The device destroys it.
+    std::function<uint64_t(void* instance)> make_surface = {};
+};
+
+struct SurfaceDesc {
+    std::function<uint64_t(void* instance)> make = {};  // WindowSystem::make_surface; the null device asks nobody
+    std::string_view label = {};
+};
+
+// Fifo: a picture a refresh of the screen. Mailbox: the newest one at each refresh, where the window system can, else Fifo.
+enum class PresentMode : uint8_t { Fifo, Mailbox };
+
+struct SurfaceSettings {
+    uint32_t width = 0, height = 0;  // pixels of the window, where the window system leaves that to us
+    PresentMode mode = PresentMode::Fifo;
+};
+
+enum class SurfaceState : uint8_t {
+    Ready,
+    Outdated,  // the window has another size: configure() again
+    Hidden,    // it has no pixels now
+    Busy,      // no texture is free yet
+    Lost,      // the window system took the surface away: destroy it and make another
+};
+
+// What the window is to show next. Its texture is copied into and presented, no more; it goes with present().
+struct SurfaceImage {
+    SurfaceState state = SurfaceState::Ready;
+    TextureHandle texture = {};  // of a Ready one
+    Format format = Format::Undefined;
+    uint32_t width = 0, height = 0;
 };
 
 // ---- what a device can do ----------------------------------------------------------------------------------------

@@ -54,7 +54,8 @@ void Simulation::move_meshes(Frame& frame, float between) {
     }
 }
 
-Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayLines& shown) {
+Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayLines& shown,
+                                const FrameBudget& budget) {
     const auto world = live();
     if (!world) return world.error();
     for (const Member& m : members_) {
@@ -68,7 +69,7 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
         const Pose pose = blend({w.before, {}}, {w.character.position(), {}}, between);
         if (auto moved = (*world)->move(*edit, pose); !moved) return moved.error();
     }
-    auto frame = (*world)->frame(camera);
+    auto frame = (*world)->frame(camera, budget);
     if (!frame) return frame;
     move_meshes(*frame, between);
     frame->time = time() - (1 - double(between)) * step_seconds();
@@ -129,8 +130,12 @@ Result<void> Play::apply(const std::string& command, const std::string& name) {
 
 Result<void> Play::keep(World& world) const { return simulation_->keep(world); }
 
-Result<Frame> Play::frame(const Camera& camera, const PlayLines& lines) {
-    return simulation_->frame(camera, between_, lines);
+Result<Frame> Play::frame(const Camera& camera, const PlayLines& lines, const FrameBudget& budget) {
+    return simulation_->frame(camera, between_, lines, budget);
 }
+
+Result<void> Play::launch(Edit edit, vec3 velocity) { return simulation_->launch(std::move(edit), velocity); }
+Result<RayHit> Play::cast(const Ray& ray) { return simulation_->cast(ray); }
+PlayCounts Play::counts() const { return simulation_->counts(); }
 
 }  // namespace kiln

@@ -34,7 +34,12 @@ public:
     /// Makes another world, as it was at the start, what this one has become: commands, what came loose, and where that is. One step.
     Result<void> keep(World& world) const;
     /// The world with its bodies between where they were before the last step (0) and where they are (1).
-    Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines);
+    Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines, const FrameBudget& budget = {});
+
+    // For whoever plays (simulation_launch.cpp).
+    Result<void> launch(Edit edit, vec3 velocity);
+    Result<RayHit> cast(const Ray& ray);
+    PlayCounts counts() const;
 
     const physics::World& world() const { return *world_; }
     int64_t steps() const { return steps_; }
@@ -126,7 +131,7 @@ private:
         int asleep = 0;  // steps
     };
     std::vector<Part> loose_;  // those that have not settled
-    int parts_ = 0;
+    int parts_ = 0, launched_ = 0;
 
     // Commands.
     std::vector<TimedCommand> commands_;

@@ -157,7 +157,7 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
 }
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
-    for (const char* verb : {"", "demo", "render", "query", "import", "export", "inspect", "validate", "schema",
+    for (const char* verb : {"", "demo", "view", "render", "query", "import", "export", "inspect", "validate", "schema",
                              "doctor", "compare", "diff", "new", "bench"}) {
         const Outcome o = run(std::string(verb) + " --help");
         EXPECT_EQ(o.code, 0) << verb;

@@ -179,6 +179,13 @@ TEST(LayeringRules, AppsAndSamplesMayNotReachIntoSrc) {
     EXPECT_THAT(client_faults("apps/cli/main.cpp", "#include \"scene/world.h\""), testing::SizeIs(1));
     EXPECT_THAT(client_faults("apps/cli/main.cpp", "#include \"../../src/scene/world.h\""), testing::SizeIs(1));
     EXPECT_THAT(client_faults("samples/hello.cpp", "#include <CLI/CLI.hpp>"), testing::SizeIs(1));
+    // The window system is the player's, and the player is the command line's.
+    EXPECT_THAT(client_faults("apps/player/window.cpp", "#include <SDL2/SDL.h>"), IsEmpty());
+    EXPECT_THAT(client_faults("apps/cli/view.cpp", "#include <SDL2/SDL.h>"), testing::SizeIs(1));
+    EXPECT_THAT(client_faults("apps/cli/view.cpp", "#include \"player/player.h\""), IsEmpty());
+    EXPECT_THAT(client_faults("apps/player/player.cpp", "#include \"cli/talk.h\""), testing::SizeIs(1));
+    EXPECT_THAT(client_faults("samples/hello.cpp", "#include \"player/player.h\""), testing::SizeIs(1));
+    EXPECT_THAT(module_faults(modules(), "src/render/presenter.cpp", "#include <SDL2/SDL.h>"), testing::SizeIs(1));
     EXPECT_THAT(client_faults("samples/hello.cpp", "#include \"base/log.h\""), testing::SizeIs(1));
     EXPECT_THAT(client_faults("samples/hello.cpp", "#include <nlohmann/json.hpp>"), testing::SizeIs(1));
 }

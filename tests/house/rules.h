@@ -40,7 +40,8 @@ std::string without_comments(std::string_view text);
 /// Includes of a file under src/: arrows, pins, and no third-party header that nobody pinned.
 Faults module_faults(const Modules& modules, const std::string& path, std::string_view text);
 
-/// Includes of a file under apps/ or samples/: the public interface, std, the system, and (apps) the command line parser.
+/// Includes of a file under apps/ or samples/: the public interface, std, the system, and (apps) the command line parser; the window system in
+/// apps/player alone, which apps/cli may use.
 Faults client_faults(const std::string& path, std::string_view text);
 
 /// Includes of a file under include/kiln: std and kiln/ only.

@@ -76,7 +76,8 @@ std::array<std::byte, 16> texel(Format format, const std::array<float, 4>& v) {
             put(h(0) >> 4 | (h(1) >> 4) << 11 | (h(2) >> 5) << 22, 0);
             break;
         }
-        case Format::Rgba8Srgb:  // never cleared: sampled and copied only
+        case Format::Rgba8Srgb:   // never cleared: sampled and copied only
+        case Format::Bgra8Unorm:  // never cleared: copied only
         case Format::Undefined:
             break;
         }

@@ -137,7 +137,7 @@ MemoryStats NullDevice::memory_stats() const {
 uint32_t NullDevice::live_handle_count() const {
     uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
                      groups_.size() + layouts_.size() + compute_.size() + render_.size() + trace_pipelines_.size() +
-                     queries_.size();
+                     queries_.size() + surfaces_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;
@@ -165,6 +165,7 @@ std::string NullDevice::live_handles() const {
     list(render_, "render pipeline");
     list(trace_pipelines_, "trace pipeline");
     list(queries_, "query set");
+    list(surfaces_, "surface");
     return out;
 }
 

@@ -60,6 +60,12 @@ struct Queries {
     std::vector<uint64_t> ticks;
 };
 
+struct Surface {
+    std::string label;
+    SurfaceSettings settings;
+    TextureHandle acquired;
+};
+
 struct Named {
     std::string label;
 };
@@ -85,6 +91,7 @@ public:
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
     Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
+    Result<SurfaceHandle> create_surface(const SurfaceDesc& desc) override;
 
     void destroy(HeapHandle handle) override { forget(heaps_, handle, "heap"); }
     void destroy(BufferHandle handle) override { forget(buffers_, handle, "buffer"); }
@@ -99,6 +106,7 @@ public:
     void destroy(RenderPipeline handle) override { forget(render_, handle, "render pipeline"); }
     void destroy(TracePipeline handle) override { forget(trace_pipelines_, handle, "trace pipeline"); }
     void destroy(QuerySet handle) override { forget(queries_, handle, "query set"); }
+    void destroy(SurfaceHandle handle) override;
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override;
@@ -123,6 +131,9 @@ public:
     SubmitId last_submit() const override { return submits_; }
     Result<std::span<std::byte>> map(BufferHandle buffer) override;
     void unmap(BufferHandle buffer) override;
+    Result<SurfaceState> configure(SurfaceHandle surface, const SurfaceSettings& settings) override;
+    Result<SurfaceImage> acquire(SurfaceHandle surface) override;
+    Result<SurfaceState> present(SurfaceHandle surface) override;
 
     MemoryStats memory_stats() const override;
     uint32_t live_handle_count() const override;
@@ -178,6 +189,7 @@ private:
     SlotMap<RenderPipeline, Pipeline> render_;
     SlotMap<TracePipeline, Pipeline> trace_pipelines_;
     SlotMap<QuerySet, Queries> queries_;
+    SlotMap<SurfaceHandle, Surface> surfaces_;
     AutoLayouts auto_layouts_;
     std::string trace_;
     SubmitId submits_ = 0;

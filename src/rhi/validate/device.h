@@ -30,6 +30,7 @@ public:
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
     Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
+    Result<SurfaceHandle> create_surface(const SurfaceDesc& desc) override;
 
     void destroy(HeapHandle handle) override;
     void destroy(BufferHandle handle) override;
@@ -44,6 +45,7 @@ public:
     void destroy(RenderPipeline handle) override { forget(objects_.render, handle); }
     void destroy(TracePipeline handle) override { forget(objects_.traces, handle); }
     void destroy(QuerySet handle) override { forget(objects_.queries, handle); }
+    void destroy(SurfaceHandle handle) override;
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override { return below_->memory_need(desc); }
@@ -68,6 +70,9 @@ public:
     SubmitId last_submit() const override { return below_->last_submit(); }
     Result<std::span<std::byte>> map(BufferHandle buffer) override;
     void unmap(BufferHandle buffer) override;
+    Result<SurfaceState> configure(SurfaceHandle surface, const SurfaceSettings& settings) override;
+    Result<SurfaceImage> acquire(SurfaceHandle surface) override;
+    Result<SurfaceState> present(SurfaceHandle surface) override;
 
     MemoryStats memory_stats() const override { return below_->memory_stats(); }
     uint32_t live_handle_count() const override { return below_->live_handle_count(); }
@@ -103,6 +108,8 @@ private:
     std::unique_ptr<Device> below_;
     std::vector<BufferHandle> written_buffers_;  // since the last submit
     std::vector<TextureWrite> written_textures_;
+    // A surface's texture is no more.
+    void expire(TextureHandle texture);
 };
 
 }  // namespace kiln::rhi::validate

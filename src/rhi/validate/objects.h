@@ -31,6 +31,7 @@ struct TextureInfo {
     TextureDesc desc;
     MemoryNeed need;
     ViewHandle whole;
+    bool shown = false;  // a surface's own
 };
 
 struct ViewInfo {
@@ -117,6 +118,13 @@ struct QueryInfo {
     std::vector<bool> written;
 };
 
+struct SurfaceInfo {
+    static constexpr std::string_view kKind = "surface";
+    std::string label;
+    bool configured = false;
+    TextureHandle acquired = {};
+};
+
 // Objects by the handle that the device below gave them. Remembers the label of the last owner of every slot, so that a
 // stale handle can be named.
 template <typename H, typename T>
@@ -180,6 +188,7 @@ struct Objects {
     Table<RenderPipeline, RenderInfo> render;
     Table<TracePipeline, TraceInfo> traces;
     Table<QuerySet, QueryInfo> queries;
+    Table<SurfaceHandle, SurfaceInfo> surfaces;
 };
 
 }  // namespace kiln::rhi::validate

@@ -430,6 +430,8 @@ void ValidateDevice::destroy(BufferHandle handle) {
 }
 
 void ValidateDevice::destroy(TextureHandle handle) {
+    if (const TextureInfo* t = objects_.textures.find(handle); t && t->shown)
+        return report_(formatted("destroy: the texture of surface '{}' is its own; present it", t->label));
     if (const TextureInfo* t = objects_.textures.find(handle); t && t->whole) objects_.views.erase(t->whole);
     tracker_.remove(handle);
     std::erase_if(written_textures_, [&](const TextureWrite& w) { return w.place.texture == handle; });

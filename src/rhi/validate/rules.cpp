@@ -62,7 +62,7 @@ std::string check_access(Access access, const TextureInfo& t) {
     for (const Needed& n : kNeeded)
         if (any(access & n.access) && !any(t.desc.usage & n.texture))
             return formatted("texture '{}' lacks the usage for {}", t.label, name(n.access));
-    if (any(access & (Access::HostRead | Access::Present)))
+    if (any(access & Access::HostRead) || (any(access & Access::Present) && !t.shown))
         return formatted("texture '{}' can't be accessed as {}", t.label, name(access));
     if (is_depth(t.desc.format) && any(access & Access::CopyRead) && access != Access::CopyRead)
         return formatted("texture '{}': CopyRead of a depth texture stands alone", t.label);

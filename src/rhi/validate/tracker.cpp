@@ -53,6 +53,11 @@ bool Tracker::ready_for_host(BufferHandle handle) {
     return it != buffers_.end() && (it->second.settled || any(it->second.allowed & Access::HostRead));
 }
 
+bool Tracker::ready_to_present(TextureHandle handle) {
+    const auto it = textures_.find(handle.bits());
+    return it != textures_.end() && it->second.front().allowed == Access::Present;
+}
+
 std::string Tracker::use(State& s, Access access, const std::string& what) {
     if (s.settled) {
         if (!writes(access)) {

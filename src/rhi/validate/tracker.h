@@ -49,6 +49,7 @@ public:
     std::vector<std::string> play(const Recording& recording);
 
     bool ready_for_host(BufferHandle handle);
+    bool ready_to_present(TextureHandle handle);
 
 private:
     struct State {

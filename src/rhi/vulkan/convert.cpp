@@ -35,6 +35,8 @@ VkFormat to_vk(Format format) {
         return VK_FORMAT_D32_SFLOAT;
     case Format::Rgba8Srgb:
         return VK_FORMAT_R8G8B8A8_SRGB;
+    case Format::Bgra8Unorm:
+        return VK_FORMAT_B8G8R8A8_UNORM;
     }
     return VK_FORMAT_UNDEFINED;
 }

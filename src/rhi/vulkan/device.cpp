@@ -77,6 +77,7 @@ Result<void> VulkanDevice::init(bool use_pipeline_cache) {
         stages_.graphics |= VK_PIPELINE_STAGE_2_MESH_SHADER_BIT_EXT;
         stages_.push |= to_vk(ShaderStage::Mesh);
     }
+    if (instance_->windows().destroy) extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
     caps_.storage_r16f = has.features.shaderStorageImageExtendedFormats;
     caps_.int64_buffer_atomics = has12.shaderBufferInt64Atomics && has.features.shaderInt64;
     caps_.multi_draw_indirect = has.features.multiDrawIndirect;
@@ -180,6 +181,7 @@ VulkanDevice::~VulkanDevice() {
         }
         // What the user left is destroyed too: live_handle_count() told them; the driver should not have to.
         const auto sweep = [&](auto& map) { map.for_each([&](auto handle, auto&) { destroy(handle); }); };
+        sweep(surfaces_);
         sweep(groups_);
         sweep(compute_);
         sweep(render_);
@@ -318,7 +320,14 @@ Result<SubmitId> VulkanDevice::submit(std::unique_ptr<CommandEncoder> encoder) {
                                        .semaphore = timeline_,
                                        .value = last_submit_ + 1,
                                        .stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT};
+    std::vector<VkSemaphoreSubmitInfo> waits;
+    for (const VkSemaphore arrival : arrivals_)
+        waits.push_back({.sType = VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO,
+                         .semaphore = arrival,
+                         .stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT});
     const VkSubmitInfo2 info{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO_2,
+                             .waitSemaphoreInfoCount = uint32_t(waits.size()),
+                             .pWaitSemaphoreInfos = waits.data(),
                              .commandBufferInfoCount = uint32_t(slots.size()),
                              .pCommandBufferInfos = commands,
                              .signalSemaphoreInfoCount = 1,
@@ -331,6 +340,7 @@ Result<SubmitId> VulkanDevice::submit(std::unique_ptr<CommandEncoder> encoder) {
         }
         return fail("submit", r);
     }
+    arrivals_.clear();
     ++last_submit_;
     for (const CommandSlot& slot : slots) running_.push_back({last_submit_, slot});
     return last_submit_;
@@ -388,7 +398,7 @@ MemoryStats VulkanDevice::memory_stats() const {
 uint32_t VulkanDevice::live_handle_count() const {
     uint32_t count = heaps_.size() + buffers_.size() + textures_.size() + samplers_.size() + shaders_.size() +
                      groups_.size() + layouts_.size() + compute_.size() + render_.size() + traces_.size() +
-                     queries_.size();
+                     queries_.size() + surfaces_.size();
     views_.for_each([&](ViewHandle, const View& v) { count += v.whole ? 0 : 1; });
     group_layouts_.for_each([&](BindGroupLayout, const GroupLayout& l) { count += l.owned ? 0 : 1; });
     return count;
@@ -416,6 +426,7 @@ std::string VulkanDevice::live_handles() const {
     list(render_, "render pipeline");
     list(traces_, "trace pipeline");
     list(queries_, "query set");
+    list(surfaces_, "surface");
     return out;
 }
 

@@ -34,6 +34,7 @@ struct Texture {
     VkImage vk;
     Allocation memory;
     ViewHandle whole;
+    bool shown = false;  // a surface's own
 };
 
 struct View {
@@ -93,6 +94,26 @@ struct Queries {
     uint32_t count;
 };
 
+struct Surface {
+    std::string label;
+    VkSurfaceKHR vk = VK_NULL_HANDLE;
+    VkSwapchainKHR swapchain = VK_NULL_HANDLE;
+    std::vector<VkImage> images;
+    // Of each image: what was drawn is done, so it may be shown. Free again when the image is acquired again.
+    std::vector<VkSemaphore> drawn;
+    // An image is there to be drawn into; taken in turns, each free when the submit that waited for it is done.
+    struct Arrival {
+        VkSemaphore semaphore;
+        SubmitId waited_for_by;
+    };
+    std::vector<Arrival> arrivals;
+    size_t next_arrival = 0;
+    Format format = Format::Undefined;
+    uint32_t width = 0, height = 0;
+    uint32_t image = 0;  // that is acquired, and its texture
+    TextureHandle acquired = {};
+};
+
 // A command buffer with a pool of its own; recycled when the work is done.
 struct CommandSlot {
     VkCommandPool pool = VK_NULL_HANDLE;
@@ -122,6 +143,7 @@ public:
     Result<RenderPipeline> create_render_pipeline(const RenderPipelineDesc& desc) override;
     Result<TracePipeline> create_trace_pipeline(const TracePipelineDesc& desc) override;
     Result<QuerySet> create_query_set(const QuerySetDesc& desc) override;
+    Result<SurfaceHandle> create_surface(const SurfaceDesc& desc) override;
 
     void destroy(HeapHandle handle) override;
     void destroy(BufferHandle handle) override;
@@ -136,6 +158,7 @@ public:
     void destroy(RenderPipeline handle) override;
     void destroy(TracePipeline handle) override;
     void destroy(QuerySet handle) override;
+    void destroy(SurfaceHandle handle) override;
 
     ViewHandle whole_view(TextureHandle texture) override;
     MemoryNeed memory_need(const BufferDesc& desc) override;
@@ -160,6 +183,9 @@ public:
     SubmitId last_submit() const override { return last_submit_; }
     Result<std::span<std::byte>> map(BufferHandle buffer) override;
     void unmap(BufferHandle) override {}
+    Result<SurfaceState> configure(SurfaceHandle surface, const SurfaceSettings& settings) override;
+    Result<SurfaceImage> acquire(SurfaceHandle surface) override;
+    Result<SurfaceState> present(SurfaceHandle surface) override;
 
     MemoryStats memory_stats() const override;
     uint32_t live_handle_count() const override;
@@ -247,6 +273,9 @@ private:
     // Fills groups, layout and owns_layout of `out`.
     Result<void> choose_layout(Pipeline& out, PipelineLayout wanted, std::span<const Reflection* const> shaders);
 
+    Result<VkSemaphore> make_semaphore();
+    void drop_swapchain(Surface& surface);  // waits for the GPU
+
     std::unique_ptr<Instance> instance_;
     Adapter adapter_;
     Caps caps_;
@@ -289,6 +318,8 @@ private:
     SlotMap<RenderPipeline, Pipeline> render_;
     SlotMap<TracePipeline, Pipeline> traces_;
     SlotMap<QuerySet, Queries> queries_;
+    SlotMap<SurfaceHandle, Surface> surfaces_;
+    std::vector<VkSemaphore> arrivals_;  // that the next submit waits for
 };
 
 }  // namespace kiln::rhi::vulkan

@@ -181,7 +181,7 @@ std::string lower(std::string_view text) {
 
 }  // namespace
 
-Result<std::unique_ptr<Instance>> Instance::create(bool validation) {
+Result<std::unique_ptr<Instance>> Instance::create(bool validation, const WindowSystem* window) {
     const std::lock_guard lock(volk_mutex());
     // llvmpipe 22.3 crashes when it compiles shaders for 512-bit vectors, which it picks by itself on CPUs that have them.
     // The driver reads this when the loader opens it, in vkCreateInstance. A value set by the user stays.
@@ -204,6 +204,15 @@ Result<std::unique_ptr<Instance>> Instance::create(bool validation) {
                        (out->validating_ && has_extension(kValidationLayer, VK_EXT_DEBUG_UTILS_EXTENSION_NAME)))) {
         extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
         out->debug_ = true;
+    }
+
+    if (window) {
+        for (const std::string& wanted : window->extensions) {
+            if (!has_extension(nullptr, wanted.c_str()))
+                return Error{"the Vulkan loader cannot draw into this display's windows: it lacks " + wanted,
+                             ErrorKind::NoDevice};
+            extensions.push_back(wanted.c_str());
+        }
     }
 
     const VkApplicationInfo application{.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO,
@@ -245,6 +254,8 @@ Result<std::unique_ptr<Instance>> Instance::create(bool validation) {
         vkCreateDebugUtilsMessengerEXT(out->instance_, &messenger, nullptr, &out->messenger_);
     }
     if (Result<void> found = out->find_adapters(); !found) return found.error();
+    if (window)
+        if (Result<void> found = out->find_presenting(*window); !found) return found.error();
     return out;
 }
 
@@ -273,6 +284,31 @@ Result<void> Instance::find_adapters() {
     for (const VkPhysicalDevice device : devices) adapters_.push_back(describe(device));
     std::stable_sort(adapters_.begin(), adapters_.end(),
                      [](const Adapter& a, const Adapter& b) { return rank(a.info.kind) < rank(b.info.kind); });
+    return {};
+}
+
+Result<void> Instance::find_presenting(const WindowSystem& window) {
+    const auto load = [&](auto& function, const char* text) {
+        function =
+            reinterpret_cast<std::remove_reference_t<decltype(function)>>(vkGetInstanceProcAddr(instance_, text));
+        return function != nullptr;
+    };
+    const bool loaded = load(windows_.destroy, "vkDestroySurfaceKHR") &&
+                        load(windows_.support, "vkGetPhysicalDeviceSurfaceSupportKHR") &&
+                        load(windows_.capabilities, "vkGetPhysicalDeviceSurfaceCapabilitiesKHR") &&
+                        load(windows_.formats, "vkGetPhysicalDeviceSurfaceFormatsKHR") &&
+                        load(windows_.modes, "vkGetPhysicalDeviceSurfacePresentModesKHR");
+    const uint64_t made = loaded && window.make_surface ? window.make_surface(instance_) : 0;
+    if (made == 0) return Error{"no Vulkan surface can be made of the window", ErrorKind::NoDevice};
+    const auto surface = VkSurfaceKHR(made);
+    for (Adapter& a : adapters_) {
+        if (!a.info.usable) continue;
+        VkBool32 can = VK_FALSE;
+        if (windows_.support(a.physical, a.queue_family, surface, &can) == VK_SUCCESS && can) continue;
+        a.info.usable = false;
+        a.info.unusable_because = "it cannot show pictures in this window";
+    }
+    windows_.destroy(instance_, surface, nullptr);
     return {};
 }
 

@@ -25,7 +25,8 @@ struct Adapter {
 class Instance {
 public:
     // Errors of kind NoDevice when there is no loader or no driver.
-    static Result<std::unique_ptr<Instance>> create(bool validation);
+    // With a window: only adapters that can show pictures in it are usable.
+    static Result<std::unique_ptr<Instance>> create(bool validation, const WindowSystem* window = nullptr);
     ~Instance();
     Instance(const Instance&) = delete;
     Instance& operator=(const Instance&) = delete;
@@ -41,6 +42,15 @@ public:
     PFN_vkSetDebugUtilsObjectNameEXT set_name = nullptr;
     PFN_vkCmdBeginDebugUtilsLabelEXT begin_label = nullptr;
     PFN_vkCmdEndDebugUtilsLabelEXT end_label = nullptr;
+    // Null without a window; likewise.
+    struct Windows {
+        PFN_vkDestroySurfaceKHR destroy = nullptr;
+        PFN_vkGetPhysicalDeviceSurfaceSupportKHR support = nullptr;
+        PFN_vkGetPhysicalDeviceSurfaceCapabilitiesKHR capabilities = nullptr;
+        PFN_vkGetPhysicalDeviceSurfaceFormatsKHR formats = nullptr;
+        PFN_vkGetPhysicalDeviceSurfacePresentModesKHR modes = nullptr;
+    };
+    const Windows& windows() const { return windows_; }
     // Messages of the validation layer go there. The reporter must outlive the instance.
     void report_to(Reporter* reporter) { reporter_ = reporter; }
     void report(std::string_view text);
@@ -48,12 +58,14 @@ public:
 private:
     Instance() = default;
     Result<void> find_adapters();
+    Result<void> find_presenting(const WindowSystem& window);
 
     VkInstance instance_ = VK_NULL_HANDLE;
     VkDebugUtilsMessengerEXT messenger_ = VK_NULL_HANDLE;
     bool debug_ = false;
     bool validating_ = false;
     Reporter* reporter_ = nullptr;
+    Windows windows_;
     std::vector<Adapter> adapters_;
 };
 

@@ -328,6 +328,8 @@ void VulkanDevice::destroy(BufferHandle handle) {
 }
 
 void VulkanDevice::destroy(TextureHandle handle) {
+    if (const Texture* t = textures_.get(handle); t && t->shown)
+        return report_("destroy: the texture of surface '" + t->label + "' is its own; present it");
     auto t = take(textures_, handle, "texture");
     if (!t) return;
     if (t->whole)

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MIT
+// A world that is played and changed at once. Two worlds, one play:
+//   world   what the user has: each dig is a change of it, in its journal and its history
+//   base    as it was when the play began, and stays: the play runs on it, and is told the same digs
+// So undoing is exact in the world, and a play without what was undone is run again from the base, to where it was.
+#pragma once
+
+#include <kiln/world.h>
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace kiln::player {
+
+class Session {
+public:
+    /// A file is opened for editing, where its folder lets us; a bundled scene is changed in memory.
+    static Result<std::unique_ptr<Session>> open(const std::string& scene, const std::string& backend);
+
+    const World& world() const { return *world_; }
+    Play& play() { return *play_; }
+    PlayCounts counts() const { return play_->counts(); }
+    /// Steps that the play has made.
+    int64_t steps() const { return steps_; }
+    double time() const { return play_->time(); }
+    /// Steps that it has still to make to be where it was before something was undone.
+    int64_t behind() const { return wanted_ > steps_ ? wanted_ - steps_ : 0; }
+
+    /// So much time has gone by. What the play is behind is made up for first, for `budget` seconds at most.
+    Result<void> advance(double seconds, double budget);
+    Result<void> step();
+
+    /// Digs made between the two are one step back.
+    void begin_stroke(const std::string& title);
+    Result<void> end_stroke();
+    bool in_stroke() const { return stroke_.has_value(); }
+    /// A ball of ground taken away or put there, in a stroke. Nothing while the play is behind.
+    Result<void> dig(vec3 at, float radius, bool add);
+    /// Likewise, without a stroke.
+    Result<void> launch(const Edit& edit, vec3 velocity);
+
+    /// False when there is none.
+    Result<bool> undo();
+    Result<bool> redo();
+    int undo_depth() const { return int(done_); }
+    /// From the start, with what was dug and thrown coming at the times it did no more: the ground is as it was left, all else begins.
+    Result<void> restart();
+    /// The world becomes what the play has made of it.
+    Result<void> keep();
+
+    /// Says where it was written.
+    Result<std::string> save();
+    bool dirty() const { return dirty_; }
+    /// What to tell somebody who leaves; empty when nothing is lost or pending.
+    std::string farewell() const;
+    /// What opening had to tell.
+    const std::string& note() const { return note_; }
+    /// Of the world's text.
+    uint64_t world_hash();
+
+private:
+    struct Action {
+        enum class Kind { Stroke, Launch, Keep } kind = Kind::Stroke;
+        int64_t at = 0;                       ///< steps made before it
+        std::vector<std::pair<int64_t, std::string>> commands{};  ///< of a stroke: steps made before each
+        Edit edit{};                          ///< Launch
+        vec3 velocity{};
+        uint32_t before = 0, after = 0;  ///< steps of the world's history
+    };
+
+    Session() = default;
+    Result<void> start();
+    /// Runs the play anew with the actions that are done.
+    Result<void> run_again(int64_t to);
+    Result<void> perform_due();
+    void add(Action action);
+
+    std::string scene_, file_, backend_, note_;
+    bool journaled_ = false, dirty_ = false, own_file_ = false;
+    std::unique_ptr<World> world_, base_;
+    std::optional<Play> play_;
+    std::optional<Action> stroke_;
+    std::vector<Action> actions_;
+    size_t done_ = 0;     // of actions_
+    uint32_t first_ = 0;  // step of the history that the base is
+    int64_t steps_ = 0, wanted_ = 0;
+    struct Due {
+        int64_t at;
+        const Action* action;
+        const std::string* command;  // of a stroke
+    };
+    std::vector<Due> due_;  // that a play which is run again has still to be told, in order
+    size_t next_due_ = 0;
+    int named_ = 0;
+    std::optional<uint64_t> hash_;
+};
+
+}  // namespace kiln::player

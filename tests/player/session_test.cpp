@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: MIT
+// A world that is played and dug at once: a block on a pillar.
+#include "player/session.h"
+#include "temp_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+namespace kiln::player {
+namespace {
+
+constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.1},
+  "edits": [{"id": "ground", "shape": "plane"},
+            {"id": "pillar", "shape": "box", "half_extents": [0.2, 1, 0.2], "position": [0, 1, 0]},
+            {"id": "block", "shape": "box", "half_extents": [0.5, 0.3, 0.5], "position": [0, 2.2, 0]}],
+  "cameras": {"main": {"position": [0, 1, 6], "target": [0, 1, 0]}}})";
+constexpr vec3 kMiddle{0, 1, 0};  // of the pillar
+
+class SessionOnAPillar : public testing::Test {
+protected:
+    SessionOnAPillar() : file_((folder_ / "pillar.kiln.json").string()) {
+        std::ofstream(file_, std::ios::binary) << kPillar;
+        open();
+    }
+    void open() {
+        session_.reset();
+        auto made = Session::open(file_, "");
+        ASSERT_TRUE(made) << made.error().message;
+        session_ = std::move(*made);
+    }
+    void ok(const Result<void>& done) { ASSERT_TRUE(done) << done.error().message; }
+    void run(int steps) {
+        for (int i = 0; i < steps; ++i) ok(session_->step());
+    }
+    void stroke(vec3 at = kMiddle) {
+        session_->begin_stroke("dig");
+        ok(session_->dig(at, 0.4f, false));
+        ok(session_->dig(at + vec3{0.1f, 0, 0}, 0.4f, false));
+        ok(session_->end_stroke());
+    }
+
+    const TempFolder folder_;
+    std::string file_;
+    std::unique_ptr<Session> session_;
+};
+
+TEST_F(SessionOnAPillar, WhatIsCutOffFallsAndUndoPutsTheWorldBack) {
+    const uint64_t before = session_->world_hash();
+    run(5);
+    EXPECT_EQ(session_->counts().bodies, 0);
+    stroke();
+    EXPECT_EQ(session_->undo_depth(), 1);
+    EXPECT_EQ(session_->world().edits().size(), 5u);
+    run(20);
+    EXPECT_EQ(session_->counts().parts, 1);
+    EXPECT_EQ(session_->counts().bodies, 1);
+    const uint64_t dug = session_->world_hash();
+    EXPECT_NE(dug, before);
+
+    auto undone = session_->undo();
+    ASSERT_TRUE(undone && *undone);
+    EXPECT_EQ(session_->world_hash(), before);
+    EXPECT_EQ(session_->undo_depth(), 0);
+    EXPECT_EQ(session_->behind(), 25);
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->steps(), 25);
+    EXPECT_EQ(session_->counts().bodies, 0);
+    ASSERT_TRUE(session_->undo());
+    EXPECT_FALSE(*session_->undo());
+
+    auto redone = session_->redo();
+    ASSERT_TRUE(redone && *redone);
+    EXPECT_EQ(session_->world_hash(), dug);
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->counts().bodies, 1);
+    EXPECT_FALSE(*session_->redo());
+}
+
+TEST_F(SessionOnAPillar, APlayThatIsRunAgainIsWhereItWas) {
+    run(3);
+    stroke();
+    run(12);
+    const auto drop = [&] { return session_->play().cast({.origin = {0, 10, 0}, .direction = {0, -1, 0}})->t; };
+    (void)session_->play().frame(Camera{});
+    const float before = drop();
+    run(1);
+    (void)session_->play().frame(Camera{});
+    EXPECT_NE(drop(), before);  // it falls
+    stroke({3, 0, 3});
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->steps(), 16);
+    (void)session_->play().frame(Camera{});
+    const float again = drop();
+    run(1);
+    (void)session_->play().frame(Camera{});
+    EXPECT_NE(drop(), again);
+    EXPECT_EQ(session_->counts().parts, 1);
+}
+
+TEST_F(SessionOnAPillar, RestartBeginsWithTheGroundAsItWasLeft) {
+    run(10);
+    stroke();
+    run(10);
+    ok(session_->restart());
+    EXPECT_EQ(session_->steps(), 0);
+    run(1);
+    EXPECT_EQ(session_->counts().parts, 1);  // cut before the first step
+    ASSERT_TRUE(*session_->undo());
+    run(1);
+    EXPECT_EQ(session_->counts().parts, 0);
+}
+
+TEST_F(SessionOnAPillar, ABallIsABodyThatUndoTakesBack) {
+    Edit ball;
+    ball.node.shape = Sphere{.radius = 0.2f};
+    ball.node.transform.position = {2, 3, 0};
+    const uint64_t before = session_->world_hash();
+    ok(session_->launch(ball, {0, 5, 0}));
+    EXPECT_EQ(session_->counts().bodies, 1);
+    EXPECT_EQ(session_->undo_depth(), 1);
+    EXPECT_EQ(session_->world_hash(), before);
+    run(10);
+    (void)session_->play().frame(Camera{});
+    const auto hit = session_->play().cast({.origin = {2, 10, 0}, .direction = {0, -1, 0}});
+    ASSERT_TRUE(hit && hit->hit);
+    const float t = 10 * (1 / 60.0f), expected = 3 + 5 * t - 9.81f * t * t / 2 + 0.2f;
+    EXPECT_NEAR(hit->position.y, expected, 0.02f);
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->counts().bodies, 0);
+}
+
+TEST_F(SessionOnAPillar, ABallThatIsNoBallIsRefusedAndNothingStays) {
+    Edit plane;
+    plane.node.shape = Plane{};
+    EXPECT_FALSE(session_->launch(plane, {}));
+    Edit ball;
+    ball.node.shape = Sphere{.radius = -1};
+    EXPECT_FALSE(session_->launch(ball, {}));
+    ball.node.shape = Sphere{.radius = 1};
+    EXPECT_FALSE(session_->launch(ball, {0, std::numeric_limits<float>::quiet_NaN(), 0}));
+    EXPECT_EQ(session_->counts().bodies, 0);
+    EXPECT_EQ(session_->undo_depth(), 0);
+    run(2);
+}
+
+TEST_F(SessionOnAPillar, KeepMakesTheWorldWhatThePlayIsAndUndoGoesBackToTheDigs) {
+    run(2);
+    stroke();
+    run(200);
+    const uint64_t dug = session_->world_hash();
+    ok(session_->keep());
+    EXPECT_NE(session_->world_hash(), dug);
+    EXPECT_TRUE(session_->world().find_edit("part1"));
+    const uint64_t kept = session_->world_hash();
+    ok(session_->keep());  // once more, of the same
+    EXPECT_EQ(session_->world_hash(), kept);
+    ASSERT_TRUE(*session_->undo() && *session_->undo());
+    EXPECT_EQ(session_->world_hash(), dug);
+    ASSERT_TRUE(*session_->redo());
+    EXPECT_EQ(session_->world_hash(), kept);
+    EXPECT_EQ(session_->behind(), 0);
+}
+
+TEST_F(SessionOnAPillar, WhatIsNotSavedIsInTheJournalAndSaidSo) {
+    EXPECT_EQ(session_->farewell(), "");
+    stroke();
+    EXPECT_TRUE(session_->dirty());
+    EXPECT_NE(session_->farewell().find("journal"), std::string::npos);
+    const uint64_t dug = session_->world_hash();
+    open();
+    EXPECT_NE(session_->note(), "");
+    EXPECT_EQ(session_->world_hash(), dug);
+    stroke({0.05f, 1, 0});
+    const auto saved = session_->save();
+    ASSERT_TRUE(saved) << saved.error().message;
+    EXPECT_EQ(*saved, file_);
+    EXPECT_EQ(session_->farewell(), "");
+    const uint64_t all = session_->world_hash();
+    open();
+    EXPECT_EQ(session_->note(), "");
+    EXPECT_EQ(session_->world_hash(), all);
+}
+
+TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
+    const std::filesystem::path here = std::filesystem::current_path();
+    std::filesystem::current_path(folder_.path());
+    auto made = Session::open("tumble", "");
+    ASSERT_TRUE(made) << made.error().message;
+    (*made)->begin_stroke("dig");
+    ok((*made)->dig({0, 0, 0}, 0.3f, false));
+    EXPECT_NE((*made)->farewell().find("Ctrl+S"), std::string::npos);
+    EXPECT_TRUE((*made)->save());
+    EXPECT_TRUE(std::filesystem::exists("tumble.kiln.json"));
+    auto other = Session::open("tumble", "");
+    ASSERT_TRUE(other);
+    const auto refused = (*other)->save();
+    ASSERT_FALSE(refused);
+    EXPECT_NE(refused.error().message.find("is there already"), std::string::npos);
+    std::filesystem::current_path(here);
+}
+
+TEST(Session, BadScenesAreNamed) {
+    const auto nothing = Session::open("/nonexistent/scene.kiln.json", "");
+    ASSERT_FALSE(nothing);
+    EXPECT_EQ(nothing.error().kind, ErrorKind::Input);
+}
+
+}  // namespace
+}  // namespace kiln::player

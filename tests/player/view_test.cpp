@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MIT
+// `kiln view` from outside: replays without a display, and one in a window.
+#include "player/virtual_display.h"
+#include "temp_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <sys/wait.h>
+
+namespace kiln::player {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.1},
+  "edits": [{"id": "ground", "shape": "plane"},
+            {"id": "pillar", "shape": "box", "half_extents": [0.1, 1, 0.1], "position": [0, 1, 0]},
+            {"id": "block", "shape": "box", "half_extents": [0.5, 0.3, 0.5], "position": [0, 2.2, 0]}],
+  "cameras": {"main": {"position": [0, 1, 6], "target": [0, 1, 0]}}})";
+
+// Digs through the middle of what the camera sees, then takes it back.
+constexpr const char* kDig = R"({"frame": 1, "mouse": [32, 18]}
+{"frame": 2, "button": "left", "down": true}
+{"frame": 28, "button": "left", "down": false}
+{"frame": 34, "key": "left ctrl", "down": true}
+{"frame": 34, "key": "z", "down": true}
+{"frame": 34, "key": "z", "down": false}
+)";
+
+struct Outcome {
+    int code = -1;
+    std::string err;
+};
+
+class View : public testing::Test {
+protected:
+    View() {
+        write("pillar.kiln.json", kPillar);
+        write("dig.jsonl", kDig);
+    }
+    std::string read(const std::string& name) const {
+        std::ifstream in(folder_ / name, std::ios::binary);
+        std::stringstream s;
+        s << in.rdbuf();
+        return s.str();
+    }
+    void write(const std::string& name, const std::string& text) {
+        std::ofstream(folder_ / name, std::ios::binary) << text;
+    }
+    Outcome run(const std::string& words, const std::string& display = "SDL_VIDEODRIVER=dummy DISPLAY=") {
+        const std::string command = "cd '" + folder_.string() + "' && " + display + " WAYLAND_DISPLAY= '" KILN_PROGRAM "' " +
+                                    words + " >.out 2>.err";
+        const int status = std::system(command.c_str());
+        EXPECT_EQ(read(".out"), "");
+        return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), read(".err")};
+    }
+    // The value of a key in a line of --ui-json, as text.
+    std::string value(const std::string& name, int frame, const std::string& key) const {
+        std::istringstream in(read(name));
+        std::string line;
+        for (int i = 0; i <= frame; ++i)
+            if (!std::getline(in, line)) return "no frame " + std::to_string(frame);
+        const size_t at = line.find("\"" + key + "\": ");
+        if (at == std::string::npos) return "no " + key + " in " + line;
+        const size_t from = at + key.size() + 4;
+        return line.substr(from, line.find_first_of(",}", from) - from);
+    }
+
+    const TempFolder folder_;
+};
+
+TEST_F(View, SaysInOneLineWhatIsWrong) {
+    write("bad.jsonl", "{\"frame\": 0, \"key\": \"escap\", \"down\": true}\n");
+    const std::tuple<const char*, int, const char*> cases[] = {
+        {"view pillar.kiln.json", 1, "no display to open a window on; --frames N"},
+        {"view pillar.kiln.json --frames 1 --keys bad.jsonl", 3, "bad.jsonl:1: "},
+        {"view pillar.kiln.json --frames 1 --keys none.jsonl", 3, "none.jsonl: cannot be read"},
+        {"view pillar.kiln.json --frames 1 --screenshot a.exr", 2, ".png"},
+        {"view pillar.kiln.json --frames 1 --screenshot none/a.png", 1, "cannot write none/a.png"},
+        {"view pillar.kiln.json --frames 1 --ui-json -", 2, "a file has to be named"},
+        {"view pillar.kiln.json --frames -1", 2, "--frames"},
+        {"view pillar.kiln.json --frames 1 --size 0x3", 2, "WIDTHxHEIGHT"},
+        {"view pillar.kiln.json --frames 1 --quality best", 2, "no such quality"},
+    };
+    for (const auto& [words, code, what] : cases) {
+        const Outcome o = run(words);
+        EXPECT_EQ(o.code, code) << words << "\n" << o.err;
+        EXPECT_THAT(o.err, HasSubstr(what)) << words;
+        EXPECT_EQ(std::count(o.err.begin(), o.err.end(), '\n'), 1) << o.err;
+    }
+    EXPECT_EQ(run("view none.kiln.json --frames 1").code, 3);
+}
+
+TEST_F(View, GpuAReplayDigsWhatIsCutFallsAndUndoPutsTheWorldBackTheSameOnEveryRun) {
+    const std::string words = "view pillar.kiln.json --size 64x36 --frames 36 --keys dig.jsonl --validation ";
+    const Outcome one = run(words + "--screenshot a.png --ui-json a.jsonl");
+    ASSERT_EQ(one.code, 0) << one.err;
+    EXPECT_EQ(value("a.jsonl", 0, "frame"), "0");
+    EXPECT_EQ(value("a.jsonl", 0, "undo_depth"), "0");
+    EXPECT_EQ(value("a.jsonl", 0, "dirty"), "false");
+    EXPECT_EQ(value("a.jsonl", 33, "parts"), "1");
+    EXPECT_EQ(value("a.jsonl", 33, "bodies"), "1");
+    EXPECT_EQ(value("a.jsonl", 33, "awake"), "1");
+    EXPECT_EQ(value("a.jsonl", 33, "undo_depth"), "1");
+    EXPECT_EQ(value("a.jsonl", 33, "dirty"), "true");
+    EXPECT_NE(value("a.jsonl", 33, "world"), value("a.jsonl", 0, "world"));
+    EXPECT_EQ(value("a.jsonl", 35, "world"), value("a.jsonl", 0, "world"));
+    EXPECT_EQ(value("a.jsonl", 35, "bodies"), "0");
+    EXPECT_EQ(value("a.jsonl", 35, "undo_depth"), "0");
+    EXPECT_THAT(read("a.jsonl"), HasSubstr("\"hints\": [0, "));
+    // Again, from the scene as it was: the journal of the first run is not part of it.
+    std::filesystem::remove(folder_ / "pillar.kiln.json.journal");
+    ASSERT_EQ(run(words + "--screenshot b.png --ui-json b.jsonl").code, 0);
+    EXPECT_EQ(read("a.png"), read("b.png"));
+    EXPECT_EQ(read("a.jsonl"), read("b.jsonl"));
+}
+
+TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
+    write("keys.jsonl", R"({"frame": 0, "key": "f1", "down": true}
+{"frame": 0, "key": "f2", "down": true}
+{"frame": 0, "key": "f3", "down": true}
+{"frame": 1, "key": "g", "down": true}
+{"frame": 3, "key": "p", "down": true}
+{"frame": 5, "key": ".", "down": true}
+{"frame": 6, "key": "v", "down": true}
+{"frame": 7, "size": [40, 24]}
+{"frame": 8, "size": [0, 0]}
+{"frame": 9, "size": [48, 20]}
+{"frame": 10, "button": "right", "down": true}
+{"frame": 10, "look": [1, 2]}
+{"frame": 10, "wheel": 1}
+{"frame": 11, "key": "escape", "down": true}
+)");
+    const Outcome o = run("view pillar.kiln.json --size 64x36 --frames 99 --keys keys.jsonl --screenshot a.png --ui-json a.jsonl");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_EQ(value("a.jsonl", 0, "bodies"), "0");
+    EXPECT_EQ(value("a.jsonl", 1, "bodies"), "1");
+    EXPECT_EQ(value("a.jsonl", 1, "undo_depth"), "1");
+    const int paused = std::stoi(value("a.jsonl", 3, "steps"));
+    EXPECT_EQ(value("a.jsonl", 3, "paused"), "true");
+    EXPECT_EQ(value("a.jsonl", 4, "steps"), std::to_string(paused));
+    EXPECT_EQ(value("a.jsonl", 6, "steps"), std::to_string(paused + 1));
+    EXPECT_EQ(value("a.jsonl", 5, "view"), "\"shaded\"");
+    EXPECT_EQ(value("a.jsonl", 6, "view"), "\"albedo\"");
+    EXPECT_EQ(value("a.jsonl", 8, "widgets"), "{");  // to its end
+    EXPECT_THAT(value("a.jsonl", 9, "widgets"), HasSubstr("hints"));
+    EXPECT_THAT(value("a.jsonl", 11, "paused"), "true");
+    EXPECT_THAT(value("a.jsonl", 12, "frame"), HasSubstr("no frame"));  // Escape ended it
+    const std::string png = read("a.png");
+    ASSERT_GT(png.size(), 24u);
+    EXPECT_EQ(uint8_t(png[19]), 48);  // width and height of the header
+    EXPECT_EQ(uint8_t(png[23]), 20);
+}
+
+TEST_F(View, GpuAWindowShowsThePicturesOfAReplayWithoutOne) {
+    const VirtualDisplay display;
+    const std::string words = "view pillar.kiln.json --size 64x36 --frames 5 --keys dig.jsonl --validation --screenshot ";
+    const Outcome shown = run(words + "a.png", "DISPLAY=" + display.name());
+    ASSERT_EQ(shown.code, 0) << shown.err;
+    std::filesystem::remove(folder_ / "pillar.kiln.json.journal");
+    ASSERT_EQ(run(words + "b.png").code, 0);
+    EXPECT_EQ(read("a.png"), read("b.png"));
+    EXPECT_GT(read("a.png").size(), 100u);
+}
+
+TEST_F(View, GpuADisplayThatIsNotThereEndsWellOrDrawsWithoutAWindow) {
+    const std::string nowhere = "SDL_VIDEODRIVER=x11 DISPLAY=:32123";
+    const Outcome without = run("view pillar.kiln.json", nowhere);
+    EXPECT_EQ(without.code, 4) << without.err;
+    EXPECT_THAT(without.err, HasSubstr("no display can be opened"));
+    const Outcome o = run("view pillar.kiln.json --frames 1 --size 16x16 --screenshot a.png", nowhere);
+    EXPECT_EQ(o.code, 0) << o.err;
+    EXPECT_THAT(o.err, HasSubstr("without a window"));
+    EXPECT_GT(read("a.png").size(), 60u);
+}
+
+}  // namespace
+}  // namespace kiln::player
