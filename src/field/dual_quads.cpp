@@ -28,9 +28,7 @@ int side_of(int edge, int face_axis) {
     const int u = edge / 4 == 0 ? 1 : 0;
     return face_axis == u ? edge >> 1 & 1 : 2 + (edge & 1);
 }
-int side_between(uint32_t slot, uint32_t next) {
-    return (slot ^ next) == 1 ? int(slot >> 1) : 2 + int(slot & 1);
-}
+int side_between(uint32_t slot, uint32_t next) { return (slot ^ next) == 1 ? int(slot >> 1) : 2 + int(slot & 1); }
 
 // Slots in the order of the quad, anticlockwise as seen from the empty side. Around the edge from +u +v over -u +v; u × v is the
 // axis, for y its opposite.

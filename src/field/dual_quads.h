@@ -33,7 +33,7 @@ using Crossing = float4;
 
 /// Slot i of an edge: the vertex of the voxel for which the edge lies at i & 1 and i >> 1 of the other two axes, in ascending order.
 using AroundEdge = std::array<uint32_t, 4>;
-inline constexpr uint32_t kNothing = UINT32_MAX;     ///< there is no voxel
+inline constexpr uint32_t kNothing = UINT32_MAX;    ///< there is no voxel
 inline constexpr uint32_t kNotPlain = 0x80000000u;  ///< added to a vertex: its voxel's faces are not plain
 
 /// Points of the lattice in metres. Whole numbers come first, so that bricks agree on what they share.

@@ -227,7 +227,7 @@ void HostBricks::distances(const sdf::Points& points, float* out, sdf::Isa isa) 
     wide_distances(wide_view(), points, out, isa);
 }
 
-float HostBricks::distance(vec3 p, sdf::Isa isa) const { return wide_distance(wide_view(), p, isa); }
+float HostBricks::distance(const vec3& p, sdf::Isa isa) const { return wide_distance(wide_view(), p, isa); }
 
 void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa) const { march(rays, hits, false, isa); }
 

@@ -59,7 +59,11 @@ public:
     /// distance); in empty cells as far as the empty cells around reach, with the right sign: a lower bound of the size; 0 outside
     /// the grid, where nothing is known. The same bits from every instruction set and from distance().
     void distances(const sdf::Points& points, float* out, sdf::Isa isa = sdf::best_isa()) const;
-    float distance(vec3 p_world, sdf::Isa isa = sdf::best_isa()) const;
+    float distance(const vec3& p_world) const {
+        const WideView& view = wide_view();
+        return view.distance(view, p_world);
+    }
+    float distance(const vec3& p_world, sdf::Isa isa) const;
 
     struct Hit {
         int state = kMarchMiss;  ///< kMarchMiss, kMarchHit, kMarchInside

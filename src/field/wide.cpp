@@ -11,6 +11,13 @@ namespace {
 // Where points without a brick read: what they find is not looked at.
 alignas(64) constexpr std::byte kNoTexels[2 * kBrickTexelCount] = {};
 
+auto distance_by(sdf::Isa isa) {
+    return isa == sdf::Isa::Avx512 ? &wide_avx512::distance
+           : isa == sdf::Isa::Avx2 ? &wide_avx2::distance
+           : isa == sdf::Isa::Sse4 ? &wide_sse4::distance
+                                   : &wide_scalar::distance;
+}
+
 WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast<uintptr_t>(codes)) & kWideAddress; }
 
 }  // namespace
@@ -22,14 +29,16 @@ WideEntry wide_entry_of_empty(uint32_t word) {
 }
 
 WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y,
-                   const uint32_t* first_way, int bytes)
+                   const uint32_t* first_way, int bytes, std::array<const uint64_t*, 3> by_texel)
     : grid(g),
       pages(first_page),
       pages_x(along_x),
       pages_y(along_y),
       ways(first_way),
       texel_bytes(bytes),
-      inverse_voxel(1.0f / g.voxel_size) {
+      inverse_voxel(1.0f / g.voxel_size),
+      places(by_texel),
+      distance(distance_by(sdf::best_isa())) {
     const int cell[3] = {g.cell_x, g.cell_y, g.cell_z}, size[3] = {g.size_x, g.size_y, g.size_z};
     for (size_t axis = 0; axis < 3; ++axis) {
         low[axis] = float(cell[axis] * kBrickVoxels);
@@ -38,13 +47,22 @@ WideView::WideView(const GridParams& g, const WidePage* const* first_page, int a
     high[3] = 1;
 }
 
-float wide_distance(const WideView& view, vec3 p, sdf::Isa isa) {
-    const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512::distance
-                     : isa == sdf::Isa::Avx2 ? &wide_avx2::distance
-                     : isa == sdf::Isa::Sse4 ? &wide_sse4::distance
-                                             : &wide_scalar::distance;
-    return run(view, p);
+std::vector<uint64_t> wide_places(int axis, ivec3 size) {
+    const auto pages = [](int cells) { return uint64_t(cells + kCellPage - 1) / kCellPage; };
+    const uint64_t page_step = axis == 0 ? 1 : axis == 1 ? pages(size.x) : pages(size.x) * pages(size.y);
+    const uint64_t step = axis == 0 ? 1 : axis == 1 ? 8 : 64;  // of a cell in its page and a texel in its brick
+    const int cells = axis == 0 ? size.x : axis == 1 ? size.y : size.z;
+    std::vector<uint64_t> out;
+    out.reserve(size_t(cells) * kBrickVoxels);
+    for (int cell = 0; cell < cells; ++cell) {
+        const uint64_t page = uint64_t(cell / kCellPage) * page_step, word = uint64_t(cell % kCellPage) * step;
+        const uint64_t entry = page * std::tuple_size_v<WidePage> + word;
+        for (uint64_t texel = 0; texel < kBrickVoxels; ++texel) out.push_back(entry << 32 | texel * step);
+    }
+    return out;
 }
+
+float wide_distance(const WideView& view, const vec3& p, sdf::Isa isa) { return distance_by(isa)(view, p); }
 
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa) {
     const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512::distances

@@ -9,6 +9,7 @@
 
 #include <array>
 #include <cstddef>
+#include <vector>
 
 namespace kiln::field {
 
@@ -35,11 +36,18 @@ struct WideView {
     // For one point: voxels a metre; first and past-the-last texel by axis, the fourth always holds 0.
     float inverse_voxel = 1;
     alignas(16) std::array<float, 4> low{}, high{};
+    /// By axis and texel, from the grid's first. The sum of a place's three: above, page * words of a page + word of its entry; below, its
+    /// texel in the brick.
+    std::array<const uint64_t*, 3> places{};
+    /// wide_distance() by the best instructions there are.
+    float (*distance)(const WideView& view, const vec3& p) = nullptr;
 
     WideView() = default;
     WideView(const GridParams& grid, const WidePage* const* pages, int pages_x, int pages_y, const uint32_t* ways,
-             int texel_bytes);
+             int texel_bytes, std::array<const uint64_t*, 3> places);
 };
+/// WideView::places of one axis; 0, 1, 2: x, y, z.
+std::vector<uint64_t> wide_places(int axis, ivec3 size);
 
 /// Rays in texels, as arrays: TexelRay's fields without `inverse`, and how far each goes (voxels).
 struct WideRays {
@@ -86,7 +94,7 @@ void wide_polish_places(RayPolish& rays, int count, sdf::Isa isa);
 /// out[i] = distance at point i, metres. See HostBricks::distances().
 void wide_distances(const WideView& view, const sdf::Points& points, float* out, sdf::Isa isa);
 /// The same for one point.
-float wide_distance(const WideView& view, vec3 p, sdf::Isa isa);
+float wide_distance(const WideView& view, const vec3& p, sdf::Isa isa);
 /// hits[i] = field_march(ray i, 0, t_max), but for `slot` (whether there is one: the caller knows it from the cell) and the counters
 /// `cells` and `voxels`, which stay 0. notes[i]: ray i's, where asked for.
 void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa);

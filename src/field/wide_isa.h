@@ -12,7 +12,7 @@
 
 #define KILN_DECLARE_WIDE(name)                                                                        \
     namespace kiln::field::name {                                                                      \
-    float distance(const WideView& view, vec3 p);                                                      \
+    float distance(const WideView& view, const vec3& p);                                               \
     void distances(const WideView& view, const sdf::Points& points, float* out);                       \
     void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes); \
     void polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z);                 \

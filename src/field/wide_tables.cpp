@@ -44,6 +44,7 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
         pages_ = base_->pages_;
         top_ = base_->top_;
         ways_ = base_->ways_;
+        places_ = base_->places_;
         const CellMap before = base_->cells_;
         base_.reset();  // its pages are this one's alone where nobody else asks them
         cells_.words().each_other_page(before.words(), [&](size_t page) { change_page(page, before, contents); });
@@ -54,6 +55,9 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
         pages_.resize_pages(pages);
         top_.assign(pages, &far_page());
         ways_ = Shared<Ways>::make(cells_.size());
+        const ivec3 size = cells_.size();
+        places_ = std::make_shared<const std::array<std::vector<uint64_t>, 3>>(
+            std::array{wide_places(0, size), wide_places(1, size), wide_places(2, size)});
         for (size_t page = 0; page < pages; ++page) {
             if (cells_.words().find(page) != nullptr) make_page(page, contents);
         }
@@ -61,7 +65,8 @@ void WideTables::make(const Field& field, const BrickContents& contents) {
     ways_.write().settle();
     const ivec3 pages = cells_.pages();
     view_ = WideView(field.grid(), top_.data(), pages.x, pages.y, ways_->words(),
-                     field.options().format == DistanceFormat::Half ? 2 : 1);
+                     field.options().format == DistanceFormat::Half ? 2 : 1,
+                     {(*places_)[0].data(), (*places_)[1].data(), (*places_)[2].data()});
     ready_.store(true, std::memory_order_release);
 }
 

@@ -9,6 +9,7 @@
 #include "field/ways.h"
 #include "field/wide.h"
 
+#include <array>
 #include <atomic>
 #include <memory>
 #include <mutex>
@@ -46,6 +47,7 @@ private:
     Pages pages_;
     std::vector<const WidePage*> top_;
     Shared<Ways> ways_;
+    std::shared_ptr<const std::array<std::vector<uint64_t>, 3>> places_;
     WideView view_;
 
     // Until then: tables that are ready, and slots baked since. None: everything is to be made.
