@@ -30,6 +30,7 @@ GlassRecord glass_record(const Material& m) {
     GlassRecord g{};
     g.ior = m.ior;
     g.opacity = m.opacity;
+    g.alpha = m.roughness * m.roughness;
     if (!(m.attenuation_distance > 0)) return g;
     const auto absorbed = [&](float left) { return -std::log(std::clamp(left, 1e-6f, 1.0f)) / m.attenuation_distance; };
     g.absorbed_red = absorbed(m.attenuation_color.x);

@@ -201,8 +201,8 @@ vec3 direct(const Scene& scene, const Hit& hit, dvec3 direction, Random& random)
     return sum;
 }
 
-// A direction that the surface is likely to send to v: the base by cosine, the reflection by normals that v sees (Dupuy
-// and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023), each as often as it reflects.
+// A direction that the surface is likely to send to v: the base by cosine, the reflection by normals that v sees, each as
+// often as it reflects.
 struct Bounce {
     vec3 direction;
     vec3 weight;  // brdf cosine / density; 0: the path ends
@@ -214,12 +214,9 @@ Bounce bounce(const SurfaceView& s, Random& random) {
     const gpu::Basis b = gpu::basis_around(s.n);
     const float pick = random.next(), u = random.next(), phi = gpu::kTwoPi * random.next();
     const vec3 v{dot(b.tangent, s.v), dot(b.bitangent, s.v), std::max(dot(s.n, s.v), 1e-4f)};
-    const vec3 w = normalize(vec3{s.alpha * v.x, s.alpha * v.y, v.z});
     vec3 l;
     if (pick < p_specular) {
-        const float z = (1 - u) * (1 + w.z) - w.z, r = std::sqrt(std::max(0.0f, 1 - z * z));
-        const vec3 cap{r * std::cos(phi) + w.x, r * std::sin(phi) + w.y, z + w.z};
-        const vec3 h = normalize(vec3{s.alpha * cap.x, s.alpha * cap.y, std::max(cap.z, 1e-7f)});
+        const vec3 h = shade::visible_normal(v, s.alpha, u, phi);
         l = h * (2 * dot(v, h)) - v;
     } else {
         const float r = std::sqrt(u);
@@ -235,6 +232,16 @@ Bounce bounce(const SurfaceView& s, Random& random) {
     const float density = p_specular * distribution / (2 * (v.z + g)) + (1 - p_specular) * l.z / gpu::kPi;
     const vec3 world = normalize(b.tangent * l.x + b.bitangent * l.y + s.n * l.z);
     return {world, shade::brdf_times_cosine(s, world) * (1 / density)};
+}
+
+// The small surface that a ray along d sees of rough glass, unless it would send the ray to where it does not belong.
+vec3 small_surface(const Material& m, vec3 n, vec3 d, float ratio, float u, float phi) {
+    if (dot(n, d) >= 0) return n;
+    const vec3 h = shade::rough_normal(n, d, m.roughness * m.roughness, u, phi);
+    const float cosine = -dot(h, d);
+    if (cosine <= 0 || dot(d + h * (2 * cosine), n) <= 0) return n;
+    if (shade::dielectric_reflectance(cosine, ratio) < 1 && dot(shade::refracted(d, h, ratio), n) >= 0) return n;
+    return h;
 }
 
 // Along a ray, and where glass takes it, to something solid; t < 0: none. Chance picks one way at every surface of glass.
@@ -255,23 +262,28 @@ Hit follow(const Scene& scene, dvec3& origin, dvec3& direction, Random& random, 
         const bool in = inside < 0;
         vec3 n = narrow(glass.normal) * (in ? 1.0f : -1.0f);  // against the ray
         const vec3 d = narrow(direction);
+        const vec3 smooth = n;
+        if (m.roughness > 0) {
+            const float u = random.next(), phi = gpu::kTwoPi * random.next();
+            n = small_surface(m, smooth, d, in ? 1 / m.ior : m.ior, u, phi);
+        }
         const float cosine = std::clamp(-dot(n, d), 0.0f, 1.0f), ratio = in ? 1 / m.ior : m.ior;
         if (random.next() < shade::dielectric_reflectance(cosine, ratio)) {
             direction = wide(normalize(d + n * (2 * cosine)));
-            origin = along(p, wide(n), off);
+            origin = along(p, wide(smooth), off);
             continue;
         }
         if (in && random.next() < m.opacity) {
             Hit outside;
             outside.t = glass.t;
-            outside.p = along(p, wide(n), 1e-4 * std::max(0.1, glass.t));
-            outside.n = n;
+            outside.p = along(p, wide(smooth), 1e-4 * std::max(0.1, glass.t));
+            outside.n = smooth;
             outside.material = m;
             outside.matte = true;
             return outside;
         }
         direction = wide(shade::refracted(d, n, ratio));
-        origin = along(p, wide(n), -off);
+        origin = along(p, wide(smooth), -off);
         inside = in ? glass.which : -1;
     }
     carried = {};

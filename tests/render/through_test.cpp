@@ -100,6 +100,21 @@ TEST_F(ThroughGpu, ClearGlassInAWhiteFurnaceVanishes) {
     }
 }
 
+// Nor does rough glass lose or make light: what small surfaces do not let through they throw back.
+TEST_F(ThroughGpu, RoughGlassInAWhiteFurnaceVanishes) {
+    Frame frame = bright_frame();
+    for (const float roughness : {0.2f, 0.5f, 0.9f}) {
+        frame.materials[1] = {.roughness = roughness, .opacity = 1e-6f};
+        frame.instances = {glass_of(Box{{0.6f, 0.8f, 0.2f}}, {-0.8f, 0, 0}, 1),
+                           glass_of(Sphere{0.6f}, {0.7f, 0, 0}, 1)};
+        const Picture p = picture(frame);
+        float worst = 0;
+        for (size_t i = 0; i < p.rgba.size(); ++i)
+            if (i % 4 != 3) worst = std::max(worst, std::fabs(p.rgba[i] - 1));
+        EXPECT_LT(worst, 0.015f) << roughness;
+    }
+}
+
 // Nothing shines but a wall behind a dark slab: what the slab's top shows is the wall's light by Fresnel's share, and black where it is mirrored past it.
 TEST_F(ThroughGpu, GlassMirrorsWhatIsSolid) {
     field::worlds::World world{"wall",

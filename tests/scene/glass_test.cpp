@@ -169,5 +169,46 @@ TEST(GlassGpu, LooksAsThePathTracerSays) {
     EXPECT_GT(image::flip(shown(*slow, true), shown(*without, true)), 0.1);
 }
 
+// Rough glass blurs what is behind it by how far it is behind: bars that touch a pane are seen in it, those far behind it are not.
+TEST(RoughGlassGpu, LooksAsThePathTracerSays) {
+    auto renderer = Renderer::create({.validation = true});
+    if (!renderer) {
+        const char* required = std::getenv("REQUIRE_VULKAN");
+        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << renderer.error().message;
+        GTEST_SKIP() << renderer.error().message;
+    }
+    const auto world = World::parse(
+        R"({"format": 1, "field": {"voxel_size": 0.03, "bounds": {"min": [-3, -1.2, -3], "max": [3, 2, 1.5]}},
+      "materials": {"a": {"base_color": [0, 0, 0], "emissive": [0.8, 0.2, 0.1], "roughness": 1}, "b": {"base_color": [0, 0, 0], "emissive": [0.1, 0.5, 0.7], "roughness": 1},
+        "frosted": {"opacity": 0.000001, "roughness": 0.4}, "smeared": {"opacity": 0.000001, "roughness": 0.45}},
+      "edits": [{"id": "1", "shape": "box", "half_extents": [0.15, 1, 0.1], "position": [-1.1, 0, -1.2], "material": "a"},
+        {"id": "2", "shape": "box", "half_extents": [0.15, 1, 0.1], "position": [-0.5, 0, -1.2], "material": "b"},
+        {"id": "3", "shape": "box", "half_extents": [0.1, 0.8, 0.05], "position": [-0.8, 0, -0.05], "material": "a"},
+        {"id": "4", "shape": "box", "half_extents": [0.2, 1, 0.1], "position": [0.9, 0.3, -1.2], "material": "b"},
+        {"id": "pane", "shape": "box", "half_extents": [0.6, 0.7, 0.05], "position": [-0.8, 0, 0.15], "material": "frosted"},
+        {"id": "ball", "shape": "sphere", "radius": 0.55, "position": [0.75, 0, 0], "material": "smeared"}],
+      "environment": {"color": [0.25, 0.3, 0.35]}, "lights": [{"type": "directional", "illuminance": 0}],
+      "cameras": {"main": {"position": [0, 0.2, 3.2], "target": [0, 0, 0], "fov_y_deg": 40, "tone_map": "neutral"}}})",
+        "test.kiln.json");
+    ASSERT_TRUE(world) << world.error().message;
+    const auto frame = world->frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    const RenderSettings settings{.width = 64, .height = 40};
+    const auto slow = render_reference(*frame, settings, 192);
+    ASSERT_TRUE(slow) << slow.error().message;
+    const Picture fast = many_rays(*renderer, *frame, settings);
+    const auto one_ray = renderer->render(*frame, settings);
+    ASSERT_TRUE(one_ray) << one_ray.error().message;
+    Frame as_smooth = *frame;
+    for (Material& m : as_smooth.materials)
+        if (m.opacity < 1) m.roughness = 0;
+    const Picture smooth = many_rays(*renderer, as_smooth, settings);
+    for (const bool right : {false, true}) {
+        EXPECT_LT(image::flip(shown(*slow, right), shown(fast, right)), 0.03) << (right ? "ball" : "pane");
+        EXPECT_LT(image::flip(shown(*slow, right), shown(*one_ray, right)), 0.06) << (right ? "ball" : "pane");
+        EXPECT_GT(image::flip(shown(*slow, right), shown(smooth, right)), 0.045) << (right ? "ball" : "pane");
+    }
+}
+
 }  // namespace
 }  // namespace kiln

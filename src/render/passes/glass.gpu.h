@@ -12,7 +12,7 @@ struct GlassRecord {
     float ior;
     float opacity;       // share of light that stays outside
     float absorbed_red;  // a metre: light falls as exp(-absorbed metres)
-    float pad_0;
+    float alpha;         // of its surface: roughness²
     float absorbed_green, absorbed_blue;
     float pad_1, pad_2;
 };
@@ -35,9 +35,16 @@ KILN_CONST uint kSeenGlassLeft = 8u;
 struct ThroughPush {
     int from_x, from_y;  // its first pixel in the tile
     int width, height;
-    uint step;  // some of kThrough…
-    uint pad_0, pad_1, pad_2;
+    uint step;     // some of kThrough…
+    uint passed;   // steps before this one
+    uint picture;  // of a row of them that become one over time
+    uint pad_0;
 };
+
+// Lobes of rough glass have as many rays, one a pixel, of four by four neighbours.
+KILN_CONST int kLobeSide = 4;
+// A lobe narrower than that many pixels is taken for a mirror's.
+KILN_CONST float kLobePixels = 2.0f;
 
 struct MeshTracePush {
     uint through;  // 1: what blends is looked for, 0: what is solid

@@ -172,6 +172,7 @@ struct TileInputs {
     bool upscales = false;      // with taa: the rays of a smaller picture are made into this one over time
     rhi::Extent shown_size;     // of the picture: else `size`
     vec2 jitter;                // where in its pixels this frame looks
+    uint32_t picture = 0;       // of the row of pictures that becomes one over time
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

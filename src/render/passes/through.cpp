@@ -130,10 +130,10 @@ struct Ways {
     Image carried;
     uint32_t step = 0;  // some of kThrough…, in the first step
 };
-// Pixels whose first surface is transparent: what that brought, and what comes through the thing it is of.
+// Pixels whose first surface is transparent: what that brought, what it lets in, and what comes through the thing it is of.
 struct First {
     Surface surface;
-    Image sum, carried;
+    Image sum, entered, carried;
 };
 struct Brought {
     Image total;
@@ -166,9 +166,9 @@ Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways
                      .width = int(size.width),
                      .height = int(size.height),
                      .step = 0,
-                     .pad_0 = 0,
-                     .pad_1 = 0,
-                     .pad_2 = 0};
+                     .passed = 0,
+                     .picture = tile.picture,
+                     .pad_0 = 0};
     Buffer rays_ended = g.create_buffer("through rays ended", ray_bytes);
     Image seen_ended = g.create("through seen ended", {.size = size, .format = rhi::Format::Rgba32Uint});
     Buffer rays_parted = g.create_buffer("through rays parted", parts ? 2 * ray_bytes : sizeof(FrameRay));
@@ -176,6 +176,7 @@ Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways
     Image carried = ways.carried, sum = ways.carried;
     Brought out;
     for (int i = 0; i <= steps; ++i) {
+        push.passed = uint32_t(i);
         push.step = (i == 0 ? ways.step | kThroughBegins : with_parts) | (i == steps ? kThroughLast : 0);
         const bool of_camera = (push.step & kThroughCamera) != 0;
         const Image solid_seen = of_camera ? solid.seen : solid_along(g, in);
@@ -211,7 +212,7 @@ Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways
                    push);
         carried = carried_now;
         sum = sum_now;
-        if (i == 0) out.first = {layer.surface, sum, carried};
+        if (i == 0) out.first = {layer.surface, sum, carried, carried};
         if (i == 1 && parts) out.first.carried = carried;  // glass has two surfaces
         in = by_rays(in, tile, frame_of_rays, rays);
     }
@@ -248,9 +249,9 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
                      .width = int(part.size.width),
                      .height = int(part.size.height),
                      .step = parts ? kThroughParts : 0,
-                     .pad_0 = 0,
-                     .pad_1 = 0,
-                     .pad_2 = 0};
+                     .passed = 0,
+                     .picture = 0,
+                     .pad_0 = 0};
     Solid solid;
     solid.seen = g.create("through solid", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     solid.light = g.create("through solid light", {.size = in.size, .format = rhi::Format::Rgba16Float});
@@ -273,7 +274,11 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
                     g.write(front.left)},
                    push);
     }
-    g.dispatch(kThroughEnd, in.size, {g.read(brought.total), g.read(parted), g.write(radiance)}, push);
+    g.dispatch(kThroughEnd, in.size,
+               {g.uniform(in.frame), g.read(or_any(in.instances.glass, in)), g.read(brought.total), g.read(parted),
+                g.read(brought.first.surface.seen), g.read(brought.first.surface.words), g.read(brought.first.sum),
+                g.read(brought.first.entered), g.write(radiance)},
+               push);
 }
 
 }  // namespace
@@ -291,9 +296,9 @@ Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image
                               .width = int(in.size.width),
                               .height = int(in.size.height),
                               .step = kThroughBegins,
-                              .pad_0 = 0,
-                              .pad_1 = 0,
-                              .pad_2 = 0};
+                              .passed = 0,
+                              .picture = 0,
+                              .pad_0 = 0};
         g.dispatch(
             kThroughFront, in.size,
             {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance), g.read(radiance),

@@ -7,6 +7,7 @@
 // At every surface of glass light goes two ways. A camera's ray has both followed twice: where it first meets glass, the mirrored one, and where it
 // first leaves glass, the one that is thrown back: these begin a picture of their own, one below the other. Elsewhere the mirrored way shows the sky, and
 // what is thrown back inside is as bright as what leaves, less what crossing the glass again takes. So no light is lost.
+// Rough glass is one of small smooth surfaces, of which a ray meets one; through_end.comp makes lobes of neighbouring rays.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -59,6 +60,29 @@ float most_of(vec3 c) { return max(c.r, max(c.g, c.b)); }
 
 // Of a way of t finest voxels in glass.
 vec3 absorbed_in(GlassRecord g, float t) { return exp(-vec3(g.absorbed_red, g.absorbed_green, g.absorbed_blue) * (t * frame.grid.voxel_size)); }
+
+// How a ray sees rough glass here, (u, phi) of rough_normal(): sixteen neighbours' rays are spread over the lobe, otherwise at every step, in
+// the next sixteen and in the next picture (additive recurrence: Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences", 2018).
+vec2 lobe_place(ivec2 pixel) {
+    ivec2 in_block = pixel & (kLobeSide - 1);
+    uint of_step = pcg_hash(push.passed);
+    // An odd factor gives the sixteen another order.
+    uint place = (uint(in_block.x + kLobeSide * in_block.y) * (of_step | 1u) + (of_step >> 8u)) & 15u;
+    uint of_block = pcg_hash(uint(pixel.x / kLobeSide) + 65536u * uint(pixel.y / kLobeSide));
+    float n = float(place + 16u * ((push.picture + of_block) & 255u));
+    vec2 turned = fract(vec2(unit_float(pcg_hash(of_step + 1u)), unit_float(pcg_hash(of_step + 2u))) + n * vec2(0.7548776662, 0.5698402910));
+    return vec2(turned.x, kTwoPi * turned.y);
+}
+
+// The small surface that a ray along d sees of glass with normal n, unless it would send the ray out of where it belongs.
+vec3 small_surface(ivec2 pixel, GlassRecord g, vec3 n, vec3 d, float ratio) {
+    if (g.alpha <= kLobePixels * frame.pixel_angle) return n;
+    vec2 place = lobe_place(pixel);
+    vec3 h = rough_normal(n, d, g.alpha, place.x, place.y);
+    if (dot(h, d) > -1e-3 || dot(reflect(d, h), n) <= 1e-3) return n;
+    if (dielectric_reflectance(-dot(h, d), ratio) < 1.0 && dot(refracted(d, h, ratio), n) >= -1e-3) return n;
+    return h;
+}
 
 void part(ivec2 pixel, int which, vec3 carried, FrameRay ray) {
     ivec2 to = pixel + ivec2(0, which * push.height);
@@ -134,13 +158,14 @@ void main() {
                     sum.rgb += carried.rgb * max(light + s.ambient * sky * (reflects * (1.0 - mirror) - view.reflected), vec3(0.0));
                     if (mirror > 0.0) part(pixel, 0, carried.rgb * s.ambient * reflects * mirror, frame_ray(at + n * off, reflect(d, n), 0.0));
                     carried.rgb *= (1.0 - g.opacity) * (1.0 - reflects);
-                    next = frame_ray(at - n * off, refracted(d, n, 1.0 / g.ior), float(which + 1u));
+                    next = frame_ray(at - n * off, refracted(d, small_surface(pixel, g, n, d, 1.0 / g.ior), 1.0 / g.ior), float(which + 1u));
                 } else {
                     vec3 inwards = towards(-normal, d);
                     vec3 crossing = absorbed_in(g, t);
                     carried.rgb *= crossing;
-                    float back = dielectric_reflectance(-dot(d, inwards), g.ior);
-                    FrameRay thrown_back = frame_ray(at + inwards * off, reflect(d, inwards), within);
+                    vec3 h = small_surface(pixel, g, inwards, d, g.ior);
+                    float back = dielectric_reflectance(-dot(d, h), g.ior);
+                    FrameRay thrown_back = frame_ray(at + inwards * off, reflect(d, h), within);
                     if (back >= 1.0) {
                         next = thrown_back;
                     } else {
@@ -150,7 +175,7 @@ void main() {
                         } else {
                             carried.rgb *= (1.0 - back) / (1.0 - back * crossing);
                         }
-                        next = frame_ray(at - inwards * off, refracted(d, inwards, g.ior), 0.0);
+                        next = frame_ray(at - inwards * off, refracted(d, h, g.ior), 0.0);
                     }
                 }
             } else {
