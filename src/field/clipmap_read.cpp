@@ -3,6 +3,7 @@
 
 #include "field/clipmap.h"
 
+#include "field/brick_walk.gpu.h"
 #include "field/host_bricks.h"
 
 #include <algorithm>

@@ -4,6 +4,7 @@
 #include "base/hash.h"
 #include "base/parallel_for.h"
 #include "base/profile.h"
+#include "field/brick_walk.gpu.h"
 #include "field/ray_refiner.h"
 #include "sdf/eval.h"
 

@@ -84,7 +84,8 @@ bool may_be_seen(const Box3& box, dvec3 eye, const shade::CameraParams& camera) 
         const dvec3 p{double(corner & 1 ? box.max.x : box.min.x) - eye.x,
                       double(corner & 2 ? box.max.y : box.min.y) - eye.y,
                       double(corner & 4 ? box.max.z : box.min.z) - eye.z};
-        // Half a thousandth of the picture more than it shows.
+        // Half a thousandth of the picture more than it shows. Jitter over time (temporal.h) moves rays from the middles of pixels by at most
+        // half a pixel, so none leaves the picture.
         const double ahead = dotted(camera.forward, p), edge = ahead + 5e-4 * std::fabs(ahead);
         const double x = dotted(camera.right, p) / wide, y = dotted(camera.up, p) / high;
         const bool out[5] = {x > edge, x<-edge, y> edge, y < -edge, ahead <= 0};

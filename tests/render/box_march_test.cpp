@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // The march that meets cells in no order (box_march.gpu.h), on the CPU: of all cells with a box, taken backwards and one by one, it ends where
 // the walk does, bit for bit.
+#include "field/brick_walk.gpu.h"
 #include "field/worlds.h"
 #include "render/gpu_boxes.h"
 

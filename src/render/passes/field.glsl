@@ -4,6 +4,7 @@
 //   with KILN_LEVELS also LevelsParams levels, LevelPlace level_places[];
 //   for KILN_FIELD_SURFACE also utexture3D materials (two texels a word, along x).
 
+#include "field/brick_walk.gpu.h"
 #include "field/codes.gpu.h"
 #include "field/cubic.gpu.h"
 

@@ -4,6 +4,7 @@
 //   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: InstanceNode nodes[];
 //   for KILN_FIELD_SURFACE also utexture3D materials.
 
+#include "field/brick_walk.gpu.h"
 #include "field/codes.gpu.h"
 #include "field/cubic.gpu.h"
 #include "render/passes/atlas.glsl"

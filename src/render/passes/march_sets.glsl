@@ -8,6 +8,10 @@
 #define field_voxel_solid set_voxel_solid
 #define field_enter set_enter
 #define voxel_exit_plane set_voxel_exit_plane
+#define brick_walk set_brick_walk
+#define brick_walk_seek set_brick_walk_seek
+#define brick_walk_solve set_brick_walk_solve
+#define is_brick set_is_brick
 #define march_brick set_march_brick
 #define texel_plane_crossing set_texel_plane_crossing
 #define cell_at set_cell_at
@@ -22,6 +26,10 @@
 #undef field_voxel_solid
 #undef field_enter
 #undef voxel_exit_plane
+#undef brick_walk
+#undef brick_walk_seek
+#undef brick_walk_solve
+#undef is_brick
 #undef march_brick
 #undef texel_plane_crossing
 #undef cell_at

@@ -44,6 +44,8 @@ shared Branch branches[kMostBranches];  // still to be opened
 shared uint branch_count;
 shared uvec2 leaves[kMostLeaves];  // part; first triangle << 3 | count
 shared uint leaf_count;
+shared uint leaves_with_holes[2];  // a bit each
+shared uint leaf_triangles[kMostLeaves];  // a bit for each of a leaf's triangles that may hide something of a point of the workgroup
 shared float leaf_boxes[6u * kMostLeaves];                // low, high, counted from the eye
 shared float leaf_places[9u * kInLeaf * kMostLeaves];     // corners of their triangles
 shared uint tile_low[3], tile_high[3];                    // ordered_bits(): of the points' box
@@ -139,11 +141,32 @@ void begin_light(LightRecord light) {
     barrier();
 }
 
+// Whether a triangle may hide something of the light from some point of the workgroup: its box, and of closed surfaces the side that it turns to
+// them (may_shade() of mesh_shadow.comp). Wider than rounding may make either.
+bool may_hide(uint flags, vec3 a, vec3 b, vec3 c) {
+    vec3 low = min(min(a, b), c);
+    vec3 high = max(max(a, b), c);
+    vec3 wider = 2e-6 * (abs(low) + abs(high));
+    if (!may_meet(tile_beam, low - wider, high + wider)) return false;
+    if ((flags & kMeshClosed) == 0u) return true;
+    vec3 n = cross(b - a, c - a);
+    // dot(n, a - q) over the points' box.
+    vec3 from_high = n * (a - tile_beam.low);
+    vec3 from_low = n * (a - tile_beam.high);
+    vec3 least = min(from_high, from_low);
+    vec3 most = max(from_high, from_low);
+    float slack = 1e-5 * dot(abs(n), abs(a) + abs(tile_beam.low) + abs(tile_beam.high) + high - low);
+    bool all_behind = (flags & kMeshMirrored) != 0u ? most.x + most.y + most.z < -slack : least.x + least.y + least.z > slack;
+    return !all_behind;
+}
+
 // The next chunk: leaf_count is 0 where there is none.
 void next_leaves() {
     uint thread = gl_LocalInvocationIndex;
     if (thread == 0u) {
         leaf_count = 0u;
+        leaves_with_holes[0] = 0u;
+        leaves_with_holes[1] = 0u;
         tile_open = 0u;
     }
     barrier();
@@ -162,6 +185,8 @@ void next_leaves() {
             if (b.part != kTopTree && leaf != 0u) {
                 uint i = atomicAdd(leaf_count, 1u);
                 leaves[i] = uvec2(b.part, leaf);
+                leaf_triangles[i] = 0u;
+                if ((mesh_parts[b.part].flags & kMeshMask) != 0u) atomicOr(leaves_with_holes[i >> 5u], 1u << (i & 31u));
                 vec3 low;
                 vec3 high;
                 node_box(b, low, high);
@@ -184,10 +209,13 @@ void next_leaves() {
         uvec2 leaf = leaves[i / kInLeaf];
         if (i % kInLeaf >= (leaf.y & 7u)) continue;
         MeshPart part = mesh_parts[leaf.x];
+        vec3 p[3];
         for (uint corner = 0u; corner < 3u; ++corner) {
-            vec3 p = mesh_point(part, vertex_position(mesh_corner(part, (leaf.y >> 3u) + i % kInLeaf, corner)));
-            for (uint axis = 0u; axis < 3u; ++axis) leaf_places[9u * i + 3u * corner + axis] = p[axis];
+            p[corner] = mesh_point(part, vertex_position(mesh_corner(part, (leaf.y >> 3u) + i % kInLeaf, corner)));
+            for (uint axis = 0u; axis < 3u; ++axis) leaf_places[9u * i + 3u * corner + axis] = p[corner][axis];
         }
+        if ((frame.flags & kFrameAccelerate) == 0u || may_hide(part.flags, p[0], p[1], p[2]))
+            atomicOr(leaf_triangles[i / kInLeaf], 1u << (i % kInLeaf));
     }
     barrier();
 }

@@ -7,6 +7,7 @@
 // all of them see the whole disc. What is found does not depend on it: without kFrameAccelerate all triangles of the scene are looked at.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
+#extension GL_EXT_control_flow_attributes : require
 #include "render/passes/frame.gpu.h"
 #include "render/passes/mesh.gpu.h"
 #include "render/passes/shadow.gpu.h"
@@ -84,7 +85,7 @@ const uint kChords = 32u;
 const float kChordPlaces[32] = float[32](-0.911369, -0.813746, -0.735969, -0.667038, -0.603449, -0.543509, -0.486234, -0.430984, -0.377309, -0.324877, -0.273427, -0.222749, -0.172668, -0.123030, -0.073698, -0.024546, 0.024546, 0.073698, 0.123030, 0.172668, 0.222749, 0.273427, 0.324877, 0.377309, 0.430984, 0.486234, 0.543509, 0.603449, 0.667038, 0.735969, 0.813746, 0.911369);
 
 uint covered[kChords];
-uint full_chords;
+uint full_chords;  // a bit each
 bool all_covered;
 
 // How many chords, as a real number, lie below x: the disc's share there, see kChordPlaces.
@@ -126,7 +127,7 @@ bool is_hole_of(Shade shade, vec3 w) {
 }
 
 // The chunk's triangle `slot`, of a part with these flags. False: nothing. Sets all_covered where it hides the whole disc.
-bool may_shade(Disc disc, uint slot, uint flags, out Shade shade) {
+bool may_shade(Disc disc, uint slot, uint flags, bool holes, out Shade shade) {
     shade.slot = slot;
     vec3 p[3];  // x, y and 1 on the disc, times metres along its middle
     for (uint i = 0u; i < 3u; ++i) {
@@ -155,82 +156,96 @@ bool may_shade(Disc disc, uint slot, uint flags, out Shade shade) {
     // Of a closed surface the faces that are turned to the point hide all that it hides.
     bool turned_away = (flags & kMeshClosed) != 0u && (height < 0.0) == ((flags & kMeshMirrored) != 0u);
     if (height == 0.0 || turned_away || any(lessThan(shade.middle + reach, vec4(0.0)))) return false;
-    bool some_left = kHoles && (flags & kMeshMask) != 0u;
-    if (some_left && disc.hard)
-        some_left = is_hole_of(shade, shade.middle.xyz);
-    else
-        some_left = some_left || any(lessThan(shade.middle - reach, vec4(0.0)));
+    bool some_left = holes || any(lessThan(shade.middle - reach, vec4(0.0)));
+    if (holes && disc.hard) some_left = is_hole_of(shade, shade.middle.xyz);
     all_covered = !some_left;
     return !disc.hard;
 }
 
-void cover(Shade shade, uint flags) {
-    // The chords that reach into the triangle.
-    uint i = uint(max(ceil(chords_below(shade.low) - 0.05), 0.0));
-    uint end = uint(clamp(floor(chords_below(shade.high) + 1.05), 0.0, float(kChords)));
-    // Where along a chord each volume changes sign: y = at + by * x, from below or from above. A volume that does not depend on y does so far out.
+// Where along a chord each volume changes sign: y = at + by * x, from below or from above.
+struct Sides {
+    vec4 up_at, up_by, down_at, down_by;
+};
+
+Sides sides_of(Shade shade) {
+    // A volume that does not depend on y changes sign far out.
     vec4 slope = mix(shade.by_y, vec4(1e-20), lessThan(abs(shade.by_y), vec4(1e-20)));
     vec4 at = -shade.middle / slope;
     vec4 by = -shade.by_x / slope;
     bvec4 up = greaterThan(slope, vec4(0.0));
-    vec4 up_at = mix(vec4(-2.0), at, up);
-    vec4 up_by = mix(vec4(0.0), by, up);
-    vec4 down_at = mix(at, vec4(2.0), up);
-    vec4 down_by = mix(by, vec4(0.0), up);
-    for (; i < end; ++i) {
+    return Sides(mix(vec4(-2.0), at, up), mix(vec4(0.0), by, up), mix(at, vec4(2.0), up), mix(by, vec4(0.0), up));
+}
+
+// The pieces of neighbouring chords lie beside each other's edges, not in rows.
+float chord_shift(uint i) { return fract(float(i) * 0.618034); }
+
+// The pieces of chord i, as long as this on each side of its middle at x, that lie within all four.
+uint pieces_within(Sides sides, uint i, float x, float half_length) {
+    vec4 above = sides.up_at + x * sides.up_by;
+    vec4 below = sides.down_at + x * sides.down_by;
+    float first = max(max(max(above.x, above.y), max(above.z, above.w)), -half_length);
+    float last = min(min(min(below.x, below.y), min(below.z, below.w)), half_length);
+    float shift = chord_shift(i);
+    float pieces = 16.0 / half_length;
+    return stretch(pieces * first + (16.0 - shift), pieces * last + (16.0 - shift));
+}
+
+void cover_chord(uint i, uint bits) {
+    uint now = covered[i] | bits;
+    covered[i] = now;
+    full_chords |= uint(now == 0xffffffffu) << i;
+}
+
+// All chords in the same order for all threads, so that what is covered stays in registers and none waits for another's.
+void cover(Shade shade) {
+    Sides sides = sides_of(shade);
+    // The chords that reach into the triangle.
+    uint begin = uint(max(ceil(chords_below(shade.low) - 0.05), 0.0));
+    uint end = uint(clamp(floor(chords_below(shade.high) + 1.05), 0.0, float(kChords)));
+    [[unroll]] for (uint i = 0u; i < kChords; ++i) {
+        float x = kChordPlaces[i];
+        uint bits = pieces_within(sides, i, x, sqrt(1.0 - x * x));
+        cover_chord(i, i >= begin && i < end ? bits : 0u);
+    }
+    all_covered = full_chords == 0xffffffffu;
+}
+
+// The same of a triangle with holes, which are looked for once every four pieces.
+void cover_with_holes(Shade shade) {
+    Sides sides = sides_of(shade);
+    uint begin = uint(max(ceil(chords_below(shade.low) - 0.05), 0.0));
+    uint end = uint(clamp(floor(chords_below(shade.high) + 1.05), 0.0, float(kChords)));
+    for (uint i = begin; i < end; ++i) {
         float x = kChordPlaces[i];
         float half_length = sqrt(1.0 - x * x);
-        vec4 above = up_at + x * up_by;
-        vec4 below = down_at + x * down_by;
-        float first = max(max(max(above.x, above.y), max(above.z, above.w)), -half_length);
-        float last = min(min(min(below.x, below.y), min(below.z, below.w)), half_length);
-        // The pieces of neighbouring chords lie beside each other's edges, not in rows.
-        float shift = fract(float(i) * 0.618034);
-        float pieces = 16.0 / half_length;
-        uint bits = stretch(pieces * first + (16.0 - shift), pieces * last + (16.0 - shift));
-        if (kHoles && (flags & kMeshMask) != 0u) {
-            for (uint k = 0u; k < 32u; k += 4u) {
-                if (((bits >> k) & 15u) == 0u) continue;
-                float y = ((float(k) + 1.5 + shift) / 16.0 - 1.0) * half_length;
-                if (is_hole_of(shade, shade.middle.xyz + x * shade.by_x.xyz + y * shade.by_y.xyz)) bits &= ~(15u << k);
-            }
+        uint bits = pieces_within(sides, i, x, half_length);
+        for (uint k = 0u; k < 32u; k += 4u) {
+            if (((bits >> k) & 15u) == 0u) continue;
+            float y = ((float(k) + 1.5 + chord_shift(i)) / 16.0 - 1.0) * half_length;
+            if (is_hole_of(shade, shade.middle.xyz + x * shade.by_x.xyz + y * shade.by_y.xyz)) bits &= ~(15u << k);
         }
-        uint before = covered[i];
-        uint now = before | bits;
-        covered[i] = now;
-        full_chords += uint(now == 0xffffffffu) - uint(before == 0xffffffffu);
+        cover_chord(i, bits);
     }
-    all_covered = full_chords == kChords;
+    all_covered = full_chords == 0xffffffffu;
 }
 
 // The triangle that the rays start on; none: kNoPart.
 uint own_part = kNoPart;
 uint own_triangle = 0u;
 
-// Covers what the chunk's triangles hide of a disc, first of those leaves that its middle is behind: a triangle that hides all of it is among
-// them. Loops are nested so that what costs most is done by all threads at once: each looks for a triangle that shades, then all draw one.
-void cover_leaves(Disc disc, Reach cone, Reach middle) {
-    uvec2 todo = uvec2(0u);
-    uvec2 later = uvec2(0u);
-    for (uint i = 0u; i < leaf_count; ++i) {
-        vec3 low = vec3(leaf_boxes[6u * i], leaf_boxes[6u * i + 1u], leaf_boxes[6u * i + 2u]);
-        vec3 high = vec3(leaf_boxes[6u * i + 3u], leaf_boxes[6u * i + 4u], leaf_boxes[6u * i + 5u]);
-        uint bit = may_meet(cone, low, high) ? 1u << (i & 31u) : 0u;
-        bool behind = may_meet(middle, low, high);
-        uvec2 bits = i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
-        todo |= behind ? bits : uvec2(0u);
-        later |= behind ? uvec2(0u) : bits;
-    }
-    uint slot = 0u;
-    uint slot_end = 0u;
+// Covers what the triangles of these leaves of the chunk hide of a disc; those of `later` come after the others. Loops are nested so that what
+// costs most is done by all threads at once: each looks for a triangle that shades, then all draw one.
+void cover_leaves(Disc disc, uvec2 todo, uvec2 later, bool holes) {
+    uint first_slot = 0u;
+    uint triangles = 0u;  // of the leaf at hand, a bit each
     uint flags = 0u;
     uint own = 0xffffffffu;  // the triangle that the rays start on
-    bool done = (todo.x | todo.y | later.x | later.y) == 0u;
+    bool done = all_covered || (todo.x | todo.y | later.x | later.y) == 0u;
     while (!done) {
         bool shades = false;
         Shade shade;
         do {
-            if (slot >= slot_end) {
+            if (triangles == 0u) {
                 bool none = (todo.x | todo.y) == 0u;
                 todo = none ? later : todo;
                 later = none ? uvec2(0u) : later;
@@ -240,23 +255,46 @@ void cover_leaves(Disc disc, Reach cone, Reach middle) {
                     uint leaf = first_word ? uint(findLSB(todo.x)) : 32u + uint(findLSB(todo.y));
                     todo = first_word ? uvec2(todo.x & (todo.x - 1u), todo.y) : uvec2(0u, todo.y & (todo.y - 1u));
                     uvec2 what = leaves[leaf];
-                    slot = kInLeaf * leaf;
-                    slot_end = slot + (what.y & 7u);
+                    first_slot = kInLeaf * leaf;
+                    triangles = leaf_triangles[leaf];
                     flags = mesh_parts[what.x].flags;
-                    own = what.x == own_part ? slot + own_triangle - (what.y >> 3u) : 0xffffffffu;
+                    own = what.x == own_part ? first_slot + own_triangle - (what.y >> 3u) : 0xffffffffu;
                 }
             }
-            if (!done) {
-                shades = slot != own && may_shade(disc, slot, flags, shade);
+            if (!done && triangles != 0u) {
+                uint slot = first_slot + uint(findLSB(triangles));
+                triangles &= triangles - 1u;
+                shades = slot != own && may_shade(disc, slot, flags, holes, shade);
                 done = all_covered;
-                ++slot;
             }
         } while (!shades && !done);
         if (shades && !done) {
-            cover(shade, flags);
+            if (holes)
+                cover_with_holes(shade);
+            else
+                cover(shade);
             done = all_covered;
         }
     }
+}
+
+// All that the chunk hides of a disc, first by those leaves that its middle is behind: a triangle that hides all of it is among them. Triangles
+// with holes come last, in a loop of their own: looking for holes costs more than all else.
+void cover_chunk(Disc disc, Reach cone, Reach middle) {
+    uvec2 todo = uvec2(0u);
+    uvec2 later = uvec2(0u);
+    for (uint i = 0u; i < leaf_count; ++i) {
+        vec3 low = vec3(leaf_boxes[6u * i], leaf_boxes[6u * i + 1u], leaf_boxes[6u * i + 2u]);
+        vec3 high = vec3(leaf_boxes[6u * i + 3u], leaf_boxes[6u * i + 4u], leaf_boxes[6u * i + 5u]);
+        uint bit = leaf_triangles[i] != 0u && may_meet(cone, low, high) ? 1u << (i & 31u) : 0u;
+        bool behind = may_meet(middle, low, high);
+        uvec2 bits = i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
+        todo |= behind ? bits : uvec2(0u);
+        later |= behind ? uvec2(0u) : bits;
+    }
+    uvec2 with_holes = kHoles ? uvec2(leaves_with_holes[0], leaves_with_holes[1]) : uvec2(0u);
+    cover_leaves(disc, todo & ~with_holes, later & ~with_holes, false);
+    if (kHoles) cover_leaves(disc, todo & with_holes, later & with_holes, true);
 }
 
 void main() {
@@ -301,7 +339,7 @@ void main() {
         while (more) {
             next_leaves();
             if (open && leaf_count != 0u) {
-                cover_leaves(disc, cone, middle);
+                cover_chunk(disc, cone, middle);
                 open = !all_covered;
             }
             more = branch_count != 0u;  // the same in all threads

@@ -64,47 +64,69 @@ void main() {
     float nearest = min(uintBitsToFloat(seen.x) * h, kFarMetres);
     vec3 inverse = inverse_of(d);
     uint top = nodes[0].skip;
-    for (uint i = 0u; i < top;) {
-        MeshNode box = nodes[i];
-        if (!meets(box, from, inverse, nearest)) {
-            i = box.skip;
-            continue;
-        }
-        ++i;
-        for (uint k = 0u; k < (box.leaf & 7u); ++k) {
-            uint which = (box.leaf >> 3u) + k;
-            MeshPart part = mesh_parts[which];
-            bool blends = (part.flags & kMeshBlend) != 0u;
-            if (blends != (push.through != 0u)) continue;
-            vec3 o = local_point(part, from);
-            vec3 v = local_vector(part, d);
-            vec3 local_inverse = inverse_of(v);
-            for (uint j = 0u; j < part.node_count;) {
-                MeshNode node = nodes[part.first_node + j];
-                if (!meets(node, o, local_inverse, nearest)) {
-                    j = node.skip;
-                    continue;
+    uint i = 0u;
+    uint next_part = 0u;  // of a leaf of the parts' tree
+    uint end_part = 0u;
+    bool more = true;
+    // Loops are nested as in march.gpu.h: all go on to a part that they meet; in it to a triangle that they meet; then all look for its holes.
+    while (more) {
+        uint which = 0u;
+        bool found = false;
+        do {
+            if (next_part < end_part) {
+                which = next_part++;
+                found = ((mesh_parts[which].flags & kMeshBlend) != 0u) == (push.through != 0u);
+            } else if (i < top) {
+                MeshNode box = nodes[i];
+                bool meets_it = meets(box, from, inverse, nearest);
+                next_part = box.leaf >> 3u;
+                end_part = next_part + (meets_it ? box.leaf & 7u : 0u);
+                i = meets_it ? i + 1u : box.skip;
+            } else {
+                more = false;
+            }
+        } while (more && !found);
+        MeshPart part = mesh_parts[which];
+        vec3 o = local_point(part, from);
+        vec3 v = local_vector(part, d);
+        vec3 local_inverse = inverse_of(v);
+        uint j = found ? 0u : part.node_count;
+        uint triangle = 0u;
+        uint end_triangle = 0u;
+        bool in_part = found;
+        while (in_part) {
+            bool candidate = false;
+            float t = 0.0;
+            vec3 w = vec3(0.0);
+            do {
+                while (triangle == end_triangle && j < part.node_count) {
+                    MeshNode node = nodes[part.first_node + j];
+                    bool meets_it = meets(node, o, local_inverse, nearest);
+                    triangle = node.leaf >> 3u;
+                    end_triangle = triangle + (meets_it ? node.leaf & 7u : 0u);
+                    j = meets_it ? j + 1u : node.skip;
                 }
-                ++j;
-                for (uint n = 0u; n < (node.leaf & 7u); ++n) {
-                    uint triangle = (node.leaf >> 3u) + n;
+                in_part = triangle < end_triangle;
+                if (in_part) {
                     vec3 a = vertex_position(mesh_corner(part, triangle, 0u)) - o;
                     vec3 b = vertex_position(mesh_corner(part, triangle, 1u)) - o;
                     vec3 c = vertex_position(mesh_corner(part, triangle, 2u)) - o;
-                    vec3 w = vec3(dot(v, cross(b, c)), dot(v, cross(c, a)), dot(v, cross(a, b)));
-                    if (min(min(w.x, w.y), w.z) < 0.0 && max(max(w.x, w.y), w.z) > 0.0) continue;
+                    w = vec3(dot(v, cross(b, c)), dot(v, cross(c, a)), dot(v, cross(a, b)));
                     float volume = w.x + w.y + w.z;
-                    if (volume == 0.0) continue;
+                    candidate = !(min(min(w.x, w.y), w.z) < 0.0 && max(max(w.x, w.y), w.z) > 0.0) && volume != 0.0;
                     w /= volume;
-                    float t = dot(w.x * a + w.y * b + w.z * c, v) / dot(v, v);
-                    if (!(t > 0.0 && t < nearest)) continue;
+                    t = dot(w.x * a + w.y * b + w.z * c, v) / dot(v, v);
+                    candidate = candidate && t > 0.0 && t < nearest;
                     // Corners turn to the left as seen from the front, whether the part is mirrored or not.
                     vec3 face = cross(mesh_vector(part, b - a), mesh_vector(part, c - a));
-                    if ((part.flags & kMeshDoubleSided) == 0u && dot(face, d) > 0.0) continue;
-                    if (!blends && (part.flags & kMeshMask) != 0u && opacity_at(part, triangle, w) < mesh_surfaces[part.surface].alpha_cutoff) continue;
-                    nearest = t;
-                    seen = uvec4(floatBitsToUint(t / h), (kSeenMesh << 28u) | triangle, which, seen.w);
+                    candidate = candidate && ((part.flags & kMeshDoubleSided) != 0u || !(dot(face, d) > 0.0));
+                    ++triangle;
                 }
+            } while (in_part && !candidate);
+            bool holes = (part.flags & (kMeshBlend | kMeshMask)) == kMeshMask;
+            if (candidate && !(holes && opacity_at(part, triangle - 1u, w) < mesh_surfaces[part.surface].alpha_cutoff)) {
+                nearest = t;
+                seen = uvec4(floatBitsToUint(t / h), (kSeenMesh << 28u) | (triangle - 1u), which, seen.w);
             }
         }
     }

@@ -77,22 +77,27 @@ vec3 level_shadow(ivec3 whole, vec3 part, vec3 direction) {
                     (part - vec3(levels.part_x, levels.part_y, levels.part_z)));
     float largest = max(max(away.x, away.y), away.z);
     float reach = level_reach(levels.cells);
-    for (int level = levels.first; level < levels.count; ++level) {
-        float size = float(1 << level);
+    // The level first, its brick after the loop: rays in step sample together.
+    int found = -1;
+    float size = 1.0;
+    uint word = 0u;
+    vec3 in_cell = vec3(0.0);
+    for (int level = levels.first; level < levels.count && found < 0; ++level) {
+        size = float(1 << level);
         if (largest >= reach * size) continue;
         ivec3 texel = whole >> level;
         ivec3 cell = ivec3(cell_of_texel(texel.x), cell_of_texel(texel.y), cell_of_texel(texel.z));
-        uint word = level_word(level, cell);
-        if (word == kCellMissing) continue;
-        vec3 in_cell = vec3(texel - cell * kBrickVoxels) + (vec3(whole & ((1 << level) - 1)) + part) / size;
-        if ((word & kCellOccupied) != 0u) {
-            float d = sampled_distance(int(word & kCellSlotMask), in_cell);
-            return vec3(d >= kSaturatedVoxels ? kFarAway : d * size, max(abs(d) - kTrilinearErrorVoxels, 0.01) * size, 0.0);
-        }
-        vec3 seen = empty_cell((word & kCellInside) != 0u, int(word & 7u), in_cell, direction);
-        return vec3(seen.x >= kFarAway ? kFarAway : seen.x * size, seen.y * size, seen.z * size);
+        word = level_word(level, cell);
+        in_cell = vec3(texel - cell * kBrickVoxels) + (vec3(whole & ((1 << level) - 1)) + part) / size;
+        if (word != kCellMissing) found = level;
     }
-    return vec3(kFarAway, 1.0, 0.0);
+    if (found < 0) return vec3(kFarAway, 1.0, 0.0);
+    if ((word & kCellOccupied) != 0u) {
+        float d = sampled_distance(int(word & kCellSlotMask), in_cell);
+        return vec3(d >= kSaturatedVoxels ? kFarAway : d * size, max(abs(d) - kTrilinearErrorVoxels, 0.01) * size, 0.0);
+    }
+    vec3 seen = empty_cell((word & kCellInside) != 0u, int(word & 7u), in_cell, direction);
+    return vec3(seen.x >= kFarAway ? kFarAway : seen.x * size, seen.y * size, seen.z * size);
 }
 #endif
 

@@ -73,15 +73,20 @@ vec3 through_glass(vec3 p, vec3 n, vec3 l, float t_last) {
     vec3 inverse = walk_inverse(l);
     uint at = 0u;
     while (at < push.node_count) {
-        InstanceNode node = nodes[at];
-        bool meets = walk_meets(node, p, inverse, t_last);
-        at = meets ? at + 1u : node.skip;
-        if (!meets || node.instance == kNoInstance) continue;
-        InstanceRecord instance = instances[node.instance];
+        // To the next leaf first, as in march_sets.glsl.
+        uint found = kNoInstance;
+        while (at < push.node_count && found == kNoInstance) {
+            InstanceNode node = nodes[at];
+            bool meets = walk_meets(node, p, inverse, t_last);
+            at = meets ? at + 1u : node.skip;
+            if (meets) found = node.instance;
+        }
+        if (found == kNoInstance) break;
+        InstanceRecord instance = instances[found];
         here = sets[instance.set];
         // Off the surface by as much as its own bricks may be wrong.
         TexelRay ray = object_ray(instance, p + n * (1.0 / instance.voxels), l);
-        left *= left_by_object(glass_of(node.instance), ray, min(t_last * instance.voxels, kFarVoxels), frame.grid.voxel_size / instance.voxels);
+        left *= left_by_object(glass_of(found), ray, min(t_last * instance.voxels, kFarVoxels), frame.grid.voxel_size / instance.voxels);
     }
     return left;
 }
