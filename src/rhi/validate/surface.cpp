@@ -63,9 +63,8 @@ Result<SurfaceState> ValidateDevice::present(SurfaceHandle surface) {
     SurfaceInfo* s = objects_.surfaces.find(surface);
     if (!s) return refuse("present: " + objects_.surfaces.why_not(surface));
     if (!s->acquired) return refuse(formatted("present: '{}' has no texture; acquire one", s->label));
-    const bool submitted = std::none_of(written_textures_.begin(), written_textures_.end(),
-                                        [&](const TextureWrite& w) { return w.place.texture == s->acquired; });
-    if (!submitted || !tracker_.ready_to_present(s->acquired))
+    // Writes are learnt of when they are submitted.
+    if (!tracker_.ready_to_present(s->acquired))
         return refuse(
             formatted("present: nothing that was submitted left the texture of '{}' ready for Present", s->label));
     expire(std::exchange(s->acquired, {}));
