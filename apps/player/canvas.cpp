@@ -10,7 +10,7 @@ namespace kiln::player {
 
 namespace {
 
-constexpr int kAdvance = 6;  // pixels of the typeface from letter to letter
+constexpr int kAdvance = 6;                    // pixels of the typeface from letter to letter
 constexpr std::string_view kDot = "\xc2\xb7";  // the middle dot in UTF-8
 
 const Glyph* find(char c) {

@@ -8,8 +8,11 @@ namespace kiln::player {
 namespace {
 
 // The most useful first: narrow pictures show as many as have room.
-constexpr std::string_view kHints[] = {"left mouse digs", "right mouse + WASD flies", "G throws", "Ctrl+Z undoes", "F1 profiler",
-                                       "P pauses",        "R restarts",               "V views",  "B adds",        "Esc quits"};
+constexpr std::string_view kHints[] = {"left mouse digs", "right mouse + WASD flies",
+                                       "G throws",        "Ctrl+Z undoes",
+                                       "F1 profiler",     "P pauses",
+                                       "R restarts",      "V views",
+                                       "B adds",          "Esc quits"};
 constexpr std::string_view kBetween = " \xc2\xb7 ";
 
 }  // namespace
@@ -23,7 +26,8 @@ std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
     if (hints) {
         std::string line;
         for (const std::string_view hint : kHints) {
-            const std::string longer = line.empty() ? std::string(hint) : line + std::string(kBetween) + std::string(hint);
+            const std::string longer =
+                line.empty() ? std::string(hint) : line + std::string(kBetween) + std::string(hint);
             if (canvas.text_width(longer) + 2 * pad > picture.width) break;
             line = longer;
         }
@@ -44,8 +48,7 @@ std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
         for (const std::string& line : profiler) wide = std::max(wide, canvas.text_width(line));
         const Rect box{0, 0, wide + 2 * pad, int(profiler.size()) * canvas.line_height() + 2 * pad};
         canvas.fill(box, 12, 12, 14, 0.6f);
-        for (size_t i = 0; i < profiler.size(); ++i)
-            canvas.text(pad, pad + int(i) * canvas.line_height(), profiler[i]);
+        for (size_t i = 0; i < profiler.size(); ++i) canvas.text(pad, pad + int(i) * canvas.line_height(), profiler[i]);
         out.emplace_back("profiler", box);
     }
     return out;

@@ -14,9 +14,9 @@ namespace kiln::player {
 namespace {
 
 constexpr std::string_view kKeys[] = {
-    "a",  "b",  "d",  "e", "f", "g", "k", "p", "q", "r", "s",      "v",          "w",           "y",         "z",
-    "1",  "2",  "3",  "4", "5", "6", "7", "8", "9", ".", "escape", "left shift", "right shift", "left ctrl", "right ctrl",
-    "f1", "f2", "f3", "f4"};
+    "a", "b",      "d",          "e",           "f",         "g",          "k",  "p",  "q",  "r", "s", "v",
+    "w", "y",      "z",          "1",           "2",         "3",          "4",  "5",  "6",  "7", "8", "9",
+    ".", "escape", "left shift", "right shift", "left ctrl", "right ctrl", "f1", "f2", "f3", "f4"};
 constexpr std::string_view kButtons[] = {"left", "middle", "right"};
 constexpr std::string_view kWords[] = {"frame", "key", "down", "mouse", "button", "look", "wheel", "size", "close"};
 constexpr int kMostFrame = 1'000'000'000;
@@ -74,7 +74,8 @@ private:
     bool string(std::string& out) {
         if (!take('"')) return false;
         const size_t to = text_.find('"', at_);
-        if (to == std::string_view::npos || text_.substr(at_, to - at_).find('\\') != std::string_view::npos) return false;
+        if (to == std::string_view::npos || text_.substr(at_, to - at_).find('\\') != std::string_view::npos)
+            return false;
         out = text_.substr(at_, to - at_);
         at_ = to + 1;
         return true;
@@ -124,7 +125,8 @@ std::string events_of(std::string_view text, std::vector<InputEvent>& out) {
         for (const auto& [name, place] : places) {
             if (word != name) continue;
             if (*place) return "\"" + word + "\" twice; leave one of them out";
-            if (value.kind != kind_of(word)) return "\"" + word + "\" wants " + std::string(kWanted[size_t(kind_of(word))]);
+            if (value.kind != kind_of(word))
+                return "\"" + word + "\" wants " + std::string(kWanted[size_t(kind_of(word))]);
             *place = value;
             return "";
         }
@@ -136,14 +138,15 @@ std::string events_of(std::string_view text, std::vector<InputEvent>& out) {
     if (!(frame->number >= 0 && frame->number <= kMostFrame) || frame->number != std::floor(frame->number))
         return "\"frame\" is a whole number from 0";
     const int at = int(frame->number);
-    const int things = (key ? 1 : 0) + (mouse || button ? 1 : 0) + (look ? 1 : 0) + (wheel ? 1 : 0) + (size ? 1 : 0) +
-                       (close ? 1 : 0);
+    const int things =
+        (key ? 1 : 0) + (mouse || button ? 1 : 0) + (look ? 1 : 0) + (wheel ? 1 : 0) + (size ? 1 : 0) + (close ? 1 : 0);
     if (things != 1) return "one thing a line: key, mouse (with button or without), look, wheel, size or close";
     if ((key || button) != bool(down))
-        return down ? "\"down\" belongs to a key or a button" : "no \"down\": true when it is pressed, false when it is let go";
+        return down ? "\"down\" belongs to a key or a button"
+                    : "no \"down\": true when it is pressed, false when it is let go";
     const auto push = [&](InputEvent::Kind kind, const std::string& name, const Value* place) {
-        out.push_back({at, kind, name, down && down->flag, place ? float(place->number) : 0,
-                       place ? float(place->second) : 0});
+        out.push_back(
+            {at, kind, name, down && down->flag, place ? float(place->number) : 0, place ? float(place->second) : 0});
     };
     for (const auto& pair : {mouse, look, size})
         if (pair && !(std::abs(pair->number) <= kMostPixels && std::abs(pair->second) <= kMostPixels))
@@ -157,7 +160,8 @@ std::string events_of(std::string_view text, std::vector<InputEvent>& out) {
     if (mouse) push(InputEvent::Kind::Mouse, "", &*mouse);
     if (button) {
         for (const std::string_view known : kButtons)
-            if (known == button->text) return push(InputEvent::Kind::Button, button->text, mouse ? &*mouse : nullptr), "";
+            if (known == button->text)
+                return push(InputEvent::Kind::Button, button->text, mouse ? &*mouse : nullptr), "";
         return "no button \"" + button->text + "\"; use left, middle or right";
     }
     if (look) push(InputEvent::Kind::Look, "", &*look);

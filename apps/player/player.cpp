@@ -22,22 +22,28 @@ namespace kiln::player {
 
 namespace {
 
-constexpr double kReplayStep = 1.0 / 60;   // seconds a frame that no clock is asked about
-constexpr double kLongestFrame = 0.1;      // what is longer is a stop, not a fast world
-constexpr double kCatchUp = 0.03;          // seconds a frame to run a play again
-constexpr double kBakeSeconds = 0.008;     // a frame, of worlds of several levels
-constexpr uint32_t kBakeBricks = 512;      // likewise, where no clock is asked
+constexpr double kReplayStep =
+    1.0 / 60 + 1e-9;  // seconds a frame that no clock is asked about: a little more than the usual step as a float
+constexpr double kLongestFrame = 0.1;   // what is longer is a stop, not a fast world
+constexpr double kCatchUp = 0.03;       // seconds a frame to run a play again
+constexpr double kBakeSeconds = 0.008;  // a frame, of worlds of several levels
+constexpr uint32_t kBakeBricks = 512;   // likewise, where no clock is asked
 constexpr int kMessageFrames = 180;
-constexpr float kBiteOfDistance = 0.03f;   // radius: as large on the screen from everywhere
+constexpr int kFramesToRest =
+    80;  // a round of the places in a pixel that rays go through, with a fourth as many of them
+constexpr float kBiteOfDistance = 0.03f;  // radius: as large on the screen from everywhere
 constexpr float kLeastBite = 0.1f, kMostBite = 0.8f;
-constexpr int kFramesABite = 10;           // while the mouse stays where it is
+constexpr int kFramesABite = 10;                       // while the mouse stays where it is
 constexpr float kBallRadius = 0.25f, kBallSpeed = 14;  // metres, m/s
-// What `auto` goes down by where frames take long: parts of the window's side that the picture has, and of the picture's that rays have.
+// What `auto` goes down by where frames take long: parts of the window's side that the picture has, and of the picture's that rays have;
+// then surfaces are as the bricks have them, which few rays hardly tell.
 struct Rung {
     int part;
     float scale;
+    bool refine;
 };
-constexpr Rung kRungs[] = {{1, 1}, {1, 0.5f}, {2, 0.5f}, {3, 0.5f}, {4, 0.5f}};
+constexpr Rung kRungs[] = {{1, 1, true},     {1, 0.5f, true},  {2, 0.5f, true},
+                           {2, 0.5f, false}, {3, 0.5f, false}, {4, 0.5f, false}};
 constexpr int kRungOfProcessor = 2;
 constexpr double kSlow = 0.066, kQuick = 0.012;  // seconds a frame
 constexpr int kFramesARung = 40;                 // a change costs the picture's history
@@ -88,6 +94,11 @@ private:
     void tell(const Result<void>& done) {
         if (!done) message(done.error().message);
     }
+    // Nothing will look other than it does: time stands still, and the last picture is as good as it gets.
+    bool rests() const {
+        return paused_ && o_.keys.empty() && input_.keys.empty() && input_.buttons.empty() && session_->behind() == 0 &&
+               frame_ > last_input_ + kFramesToRest && frame_ > message_until_;
+    }
     bool replays() const { return !o_.keys.empty() || !window_; }
 
     PlayerOptions o_;
@@ -102,7 +113,7 @@ private:
     PlayLines lines_;
     View view_ = View::Shaded;
     int width_ = 0, height_ = 0;
-    int frame_ = 0, message_until_ = 0, last_bite_ = 0;
+    int frame_ = 0, message_until_ = 0, last_bite_ = 0, last_input_ = 0;
     vec3 bite_towards_{};
     float speed_ = 4;  // m/s
     bool paused_ = false, profiler_ = false, done_ = false;
@@ -156,6 +167,7 @@ RenderSettings Player::settings() const {
     const Rung& rung = kRungs[rung_];
     s.width = (width_ + rung.part - 1) / rung.part;
     s.height = (height_ + rung.part - 1) / rung.part;
+    s.refine = s.refine && rung.refine;
     if (rung.scale < 1 && view_ == View::Shaded) {
         s.taa = true;
         s.scale = rung.scale;
@@ -192,6 +204,7 @@ Result<void> Player::take_events() {
 Result<void> Player::take(const InputEvent& e) {
     using Kind = InputEvent::Kind;
     input_.take(e);
+    last_input_ = frame_;
     switch (e.kind) {
     case Kind::Close:
         done_ = true;
@@ -316,18 +329,18 @@ void Player::describe(const RenderStats& stats) {
 std::string Player::ui_line(const std::vector<std::pair<std::string, Rect>>& widgets) {
     std::string places;
     for (const auto& [id, r] : widgets)
-        places += (places.empty() ? "" : ", ") + ("\"" + id) + "\": [" + std::to_string(r.x) + ", " + std::to_string(r.y) +
-                  ", " + std::to_string(r.width) + ", " + std::to_string(r.height) + "]";
+        places += (places.empty() ? "" : ", ") + ("\"" + id) + "\": [" + std::to_string(r.x) + ", " +
+                  std::to_string(r.y) + ", " + std::to_string(r.width) + ", " + std::to_string(r.height) + "]";
     const PlayCounts counts = session_->counts();
     char hash[20];
     std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(session_->world_hash()));
-    return "{\"frame\": " + std::to_string(frame_) + ", \"widgets\": {" + places + "}, \"selection\": null, \"dirty\": " +
-           (session_->dirty() ? "true" : "false") + ", \"undo_depth\": " + std::to_string(session_->undo_depth()) +
-           ", \"size\": [" + std::to_string(width_) + ", " + std::to_string(height_) + "], \"view\": \"" +
-           std::string(kViews[size_t(view_)]) + "\", \"paused\": " + (paused_ ? "true" : "false") +
-           ", \"steps\": " + std::to_string(session_->steps()) + ", \"bodies\": " + std::to_string(counts.bodies) +
-           ", \"awake\": " + std::to_string(counts.awake) + ", \"parts\": " + std::to_string(counts.parts) +
-           ", \"world\": \"" + hash + "\"}\n";
+    return "{\"frame\": " + std::to_string(frame_) + ", \"widgets\": {" + places +
+           "}, \"selection\": null, \"dirty\": " + (session_->dirty() ? "true" : "false") +
+           ", \"undo_depth\": " + std::to_string(session_->undo_depth()) + ", \"size\": [" + std::to_string(width_) +
+           ", " + std::to_string(height_) + "], \"view\": \"" + std::string(kViews[size_t(view_)]) +
+           "\", \"paused\": " + (paused_ ? "true" : "false") + ", \"steps\": " + std::to_string(session_->steps()) +
+           ", \"bodies\": " + std::to_string(counts.bodies) + ", \"awake\": " + std::to_string(counts.awake) +
+           ", \"parts\": " + std::to_string(counts.parts) + ", \"world\": \"" + hash + "\"}\n";
 }
 
 Result<Picture> Player::draw(double seconds) {
@@ -357,7 +370,14 @@ Result<void> Player::run() {
         fly(float(seconds));
         if (auto used = use_tools(); !used) return used;
         const double budget = replays() ? std::numeric_limits<double>::infinity() : kCatchUp;
-        if (auto gone = session_->advance(paused_ ? 0 : seconds, budget); !gone) return gone;
+        if (auto gone = session_->advance(paused_ ? 0 : seconds, budget); !gone) {
+            paused_ = true;  // and the world is there to be looked at, and saved
+            message("the play stopped: " + gone.error().message);
+        }
+        if (window_ && rests()) {
+            window_->wait(0.2);
+            continue;
+        }
         std::vector<std::pair<std::string, Rect>> widgets;
         bool hidden = width_ <= 0 || height_ <= 0;
         if (!hidden) {
@@ -407,7 +427,8 @@ Result<void> run_player(const PlayerOptions& options) {
 std::string_view player_keys() {
     return "left mouse        dig; what is cut off falls\n"
            "middle mouse, B   add ground\n"
-           "right mouse       look around; with W A S D fly, Q and E down and up, Shift faster; the wheel sets the speed\n"
+           "right mouse       look around; with W A S D fly, Q and E down and up, Shift faster; the wheel sets the "
+           "speed\n"
            "G                 throw a ball\n"
            "Ctrl+Z, Ctrl+Y    undo a stroke or a throw, redo it\n"
            "P, .              pause, make one step\n"

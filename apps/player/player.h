@@ -18,10 +18,10 @@ struct PlayerOptions {
     bool choose_quality = true;      ///< instead: what the device can do sixty times a second, or comes near
     int width = 1280, height = 720;  ///< of the window, pixels
     int frames = 0;                  ///< ends after so many; 0: when the window is closed
-    std::string keys{};              ///< file of input events; then, and without a display, a frame is a sixtieth of a second
-    std::string screenshot{};        ///< .png of the last frame
-    std::string ui_json{};           ///< a JSON object a line for each frame
-    bool window = true;              ///< false: do not show anything
+    std::string keys{};        ///< file of input events; then, and without a display, a frame is a sixtieth of a second
+    std::string screenshot{};  ///< .png of the last frame
+    std::string ui_json{};     ///< a JSON object a line for each frame
+    bool window = true;        ///< false: do not show anything
     bool validation = false;
     std::function<void(std::string_view line)> say = [](std::string_view) {};  ///< for people
 };

@@ -23,7 +23,8 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
     out->scene_ = scene;
     out->backend_ = backend;
     const auto bundled = bundled_scenes();
-    const bool is_bundled = std::any_of(bundled.begin(), bundled.end(), [&](const auto& s) { return s.first == scene; });
+    const bool is_bundled =
+        std::any_of(bundled.begin(), bundled.end(), [&](const auto& s) { return s.first == scene; });
     out->file_ = is_bundled ? scene + ".kiln.json" : scene;
     Result<World> world = Error{};
     if (!is_bundled) {
@@ -59,8 +60,8 @@ Result<void> Session::start() {
 Result<void> Session::perform_due() {
     for (; next_due_ < due_.size() && due_[next_due_].at <= steps_; ++next_due_) {
         const Due& due = due_[next_due_];
-        const auto done = due.command ? play_->apply(*due.command, "a dig")
-                                      : play_->launch(due.action->edit, due.action->velocity);
+        const auto done =
+            due.command ? play_->apply(*due.command, "a dig") : play_->launch(due.action->edit, due.action->velocity);
         if (!done) return done;
     }
     return {};
@@ -72,7 +73,7 @@ Result<void> Session::run_again(int64_t to) {
     next_due_ = 0;
     for (size_t i = 0; i < done_; ++i) {
         const Action& a = actions_[i];
-        for (const auto& [at, command] : a.commands) due_.push_back({at, &a, &command});
+        for (const Action::Dig& dig : a.digs) due_.push_back({dig.at, &a, &dig.command});
         if (a.kind == Action::Kind::Launch) due_.push_back({a.at, &a, nullptr});
     }
     std::stable_sort(due_.begin(), due_.end(), [](const Due& a, const Due& b) { return a.at < b.at; });
@@ -115,6 +116,7 @@ void Session::begin_stroke(const std::string& title) {
     History history = world_->history();
     stroke_.emplace();
     stroke_->at = steps_;
+    stroke_->parts_before = counts().parts;
     stroke_->before = history.now();
     history.begin_group(title);
 }
@@ -123,7 +125,7 @@ Result<void> Session::end_stroke() {
     if (!stroke_) return {};
     Action stroke = std::move(*stroke_);
     stroke_.reset();
-    if (stroke.commands.empty()) return world_->history().cancel_group();
+    if (stroke.digs.empty()) return world_->history().cancel_group();
     if (auto ended = world_->history().end_group(); !ended) return ended;
     stroke.after = world_->history().now();
     add(std::move(stroke));
@@ -135,10 +137,10 @@ Result<void> Session::dig(vec3 at, float radius, bool add) {
     std::string name;
     do name = (add ? "heap" : "dig") + std::to_string(++named_);
     while (world_->find_edit(name));
-    const std::string command = "{\"add\": {\"id\": \"" + name + "\", \"shape\": \"sphere\", \"radius\": " + number(radius) +
-                                ", \"position\": [" + number(at.x) + ", " + number(at.y) + ", " + number(at.z) +
-                                "], \"op\": \"" + (add ? "union" : "subtract") + "\", \"blend_radius\": " +
-                                number(radius * 0.25f) + "}}";
+    const std::string command = "{\"add\": {\"id\": \"" + name +
+                                "\", \"shape\": \"sphere\", \"radius\": " + number(radius) + ", \"position\": [" +
+                                number(at.x) + ", " + number(at.y) + ", " + number(at.z) + "], \"op\": \"" +
+                                (add ? "union" : "subtract") + "\", \"blend_radius\": " + number(radius * 0.25f) + "}}";
     // Both or none.
     if (auto applied = play_->apply(command, "a dig"); !applied) return applied;
     if (auto applied = world_->apply(command, "a dig"); !applied) {
@@ -147,7 +149,7 @@ Result<void> Session::dig(vec3 at, float radius, bool add) {
     }
     hash_.reset();
     dirty_ = true;
-    stroke_->commands.emplace_back(steps_, command);
+    stroke_->digs.push_back({steps_, name, command});
     return {};
 }
 
@@ -164,6 +166,13 @@ Result<void> Session::launch(const Edit& edit, vec3 velocity) {
     return {};
 }
 
+bool Session::fill_in(const Action& a) {
+    if (behind() > 0 || a.kind != Action::Kind::Stroke || counts().parts != a.parts_before) return false;
+    for (size_t i = a.digs.size(); i-- > 0;)
+        if (!play_->apply("{\"remove\": \"" + a.digs[i].name + "\"}", "undo")) return false;
+    return true;
+}
+
 Result<bool> Session::undo() {
     if (auto ended = end_stroke(); !ended) return ended.error();
     if (done_ == 0) return false;
@@ -172,21 +181,32 @@ Result<bool> Session::undo() {
     --done_;
     hash_.reset();
     dirty_ = true;
-    if (a.kind != Action::Kind::Keep)
+    if (a.kind != Action::Kind::Keep && !fill_in(a))
         if (auto run = run_again(wanted_); !run) return run.error();
     return true;
+}
+
+Result<void> Session::perform(Action& a) {
+    a.at = steps_;
+    a.parts_before = counts().parts;
+    if (a.kind == Action::Kind::Launch) return play_->launch(a.edit, a.velocity);
+    for (Action::Dig& dig : a.digs) {
+        dig.at = steps_;
+        if (auto done = play_->apply(dig.command, "redo"); !done) return done;
+    }
+    return {};
 }
 
 Result<bool> Session::redo() {
     if (auto ended = end_stroke(); !ended) return ended.error();
     if (done_ == actions_.size()) return false;
-    const Action& a = actions_[done_];
+    Action& a = actions_[done_];
     if (auto gone = world_->history().go_to(a.after); !gone) return gone.error();
     ++done_;
     hash_.reset();
     dirty_ = true;
-    if (a.kind != Action::Kind::Keep)
-        if (auto run = run_again(std::max(wanted_, a.at)); !run) return run.error();
+    const auto made = behind() > 0 ? run_again(std::max(wanted_, a.at)) : perform(a);
+    if (!made) return made.error();
     return true;
 }
 
@@ -195,7 +215,7 @@ Result<void> Session::restart() {
     for (size_t i = 0; i < done_; ++i) {
         Action& a = actions_[i];
         a.at = 0;
-        for (auto& [at, command] : a.commands) at = 0;
+        for (Action::Dig& dig : a.digs) dig.at = 0;
     }
     return run_again(0);
 }
@@ -234,7 +254,8 @@ Result<std::string> Session::save() {
 
 std::string Session::farewell() const {
     if (!dirty_) return {};
-    if (journaled_) return file_ + " was not saved; its journal has what was changed, and the next start goes on from there";
+    if (journaled_)
+        return file_ + " was not saved; its journal has what was changed, and the next start goes on from there";
     return "what was changed in " + scene_ + " was not saved; Ctrl+S would have written " + file_;
 }
 

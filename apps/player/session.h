@@ -64,15 +64,24 @@ public:
 private:
     struct Action {
         enum class Kind { Stroke, Launch, Keep } kind = Kind::Stroke;
-        int64_t at = 0;                       ///< steps made before it
-        std::vector<std::pair<int64_t, std::string>> commands{};  ///< of a stroke: steps made before each
-        Edit edit{};                          ///< Launch
+        int64_t at = 0;  ///< steps made before it
+        struct Dig {
+            int64_t at;
+            std::string name, command;
+        };
+        std::vector<Dig> digs{};  ///< Stroke
+        int parts_before = 0;     ///< that had come loose
+        Edit edit{};              ///< Launch
         vec3 velocity{};
         uint32_t before = 0, after = 0;  ///< steps of the world's history
     };
 
     Session() = default;
     Result<void> start();
+    /// Takes the digs of a stroke out of the play as it is; false where it cut something loose, or the play will not.
+    bool fill_in(const Action& stroke);
+    /// Makes an action that was undone again, now.
+    Result<void> perform(Action& action);
     /// Runs the play anew with the actions that are done.
     Result<void> run_again(int64_t to);
     Result<void> perform_due();

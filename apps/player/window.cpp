@@ -54,9 +54,8 @@ Result<std::unique_ptr<Window>> Window::open(const std::string& title, int width
     if (SDL_Init(SDL_INIT_VIDEO) != 0) return fault("no display can be opened");
     std::unique_ptr<Window> out(new Window);
     out->impl_ = std::make_unique<Impl>();
-    out->impl_->window =
-        SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
-                         SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
+    out->impl_->window = SDL_CreateWindow(title.c_str(), SDL_WINDOWPOS_CENTERED, SDL_WINDOWPOS_CENTERED, width, height,
+                                          SDL_WINDOW_VULKAN | SDL_WINDOW_RESIZABLE | SDL_WINDOW_ALLOW_HIGHDPI);
     if (!out->impl_->window) {
         out->impl_.reset();
         return fault("no window can be opened");
@@ -121,7 +120,8 @@ std::vector<InputEvent> Window::poll() {
             const float x = float(e.button.x) * sx, y = float(e.button.y) * sy;
             if (!impl_->held) out.push_back({.kind = Kind::Mouse, .x = x, .y = y});
             if (const char* name = button_name(e.button.button))
-                out.push_back({.kind = Kind::Button, .name = name, .down = e.type == SDL_MOUSEBUTTONDOWN, .x = x, .y = y});
+                out.push_back(
+                    {.kind = Kind::Button, .name = name, .down = e.type == SDL_MOUSEBUTTONDOWN, .x = x, .y = y});
         } else if (e.type == SDL_MOUSEMOTION && impl_->held) {
             out.push_back({.kind = Kind::Look, .x = float(e.motion.xrel) * sx, .y = float(e.motion.yrel) * sy});
         } else if (e.type == SDL_MOUSEMOTION) {
@@ -131,8 +131,10 @@ std::vector<InputEvent> Window::poll() {
             out.push_back({.kind = Kind::Wheel, .y = e.wheel.direction == SDL_MOUSEWHEEL_FLIPPED ? -turned : turned});
         } else if (e.type == SDL_WINDOWEVENT && e.window.event == SDL_WINDOWEVENT_FOCUS_LOST) {
             // Keys that are let go elsewhere are never told.
-            for (const std::string_view key : known_keys()) out.push_back({.kind = Kind::Key, .name = std::string(key)});
-            for (const char* button : {"left", "middle", "right"}) out.push_back({.kind = Kind::Button, .name = button});
+            for (const std::string_view key : known_keys())
+                out.push_back({.kind = Kind::Key, .name = std::string(key)});
+            for (const char* button : {"left", "middle", "right"})
+                out.push_back({.kind = Kind::Button, .name = button});
         }
     }
     return out;

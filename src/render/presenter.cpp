@@ -21,7 +21,8 @@ std::vector<Tap> taps(int from, int to) {
     std::vector<Tap> out;
     for (int i = 0; i < to; ++i) {
         // Middles of pixels, in 256ths of one of the picture's.
-        const int64_t at = std::clamp<int64_t>((int64_t{2} * i + 1) * from * 128 / to - 128, 0, int64_t{from - 1} * 256);
+        const int64_t at =
+            std::clamp<int64_t>((int64_t{2} * i + 1) * from * 128 / to - 128, 0, int64_t{from - 1} * 256);
         const int first = int(at / 256);
         out.push_back({first, std::min(first + 1, from - 1), int(at % 256)});
     }
@@ -114,12 +115,11 @@ Result<kiln::Shown> Presenter::show(const Picture& picture, int width, int heigh
             continue;
         }
         stretch(picture, int(image->width), int(image->height), image->format == rhi::Format::Bgra8Unorm, texels_);
-        auto written = device_.write_texture(
-            {.place = {.texture = image->texture},
-             .size = {image->width, image->height},
-             .before = rhi::Access::Undefined,
-             .after = rhi::Access::Present},
-            texels_);
+        auto written = device_.write_texture({.place = {.texture = image->texture},
+                                              .size = {image->width, image->height},
+                                              .before = rhi::Access::Undefined,
+                                              .after = rhi::Access::Present},
+                                             texels_);
         if (!written) return written.error();
         auto submitted = device_.submit(device_.create_encoder("show"));
         if (!submitted) return submitted.error();

@@ -83,7 +83,8 @@ TEST(InputEvents, EachErrorNamesFileLineAndMend) {
 
 TEST(InputEvents, EveryPartOfAFileIsReadOrRefusedAndNothingElseHappens) {
     const std::string whole =
-        "{\"frame\": 2, \"mouse\": [3, 4], \"button\": \"left\", \"down\": true}\n{\"frame\": 3, \"look\": [-4e0, 5.25]}";
+        "{\"frame\": 2, \"mouse\": [3, 4], \"button\": \"left\", \"down\": true}\n{\"frame\": 3, \"look\": [-4e0, "
+        "5.25]}";
     for (size_t i = 0; i <= whole.size(); ++i) {
         (void)parse_input_events(whole.substr(0, i), "keys");
         for (const char c : {'\0', '"', '{', '[', '\n', '\xff', '9'}) {
@@ -118,10 +119,12 @@ TEST(FlyCamera, LooksAsItsStartDoes) {
 TEST(FlyCamera, RaysThroughPixelsSpanTheAngleOfView) {
     const FlyCamera fly(Camera{.position = {0, 0, 0}, .target = {0, 0, -1}, .fov_y_deg = 90});
     const int w = 200, h = 100;
-    const auto angle = [&](float x, float y) { return std::acos(double(dot(fly.ray(x, y, w, h).direction, {0, 0, -1}))); };
+    const auto angle = [&](float x, float y) {
+        return std::acos(double(dot(fly.ray(x, y, w, h).direction, {0, 0, -1})));
+    };
     EXPECT_NEAR(angle(w * 0.5f - 0.5f, h * 0.5f - 0.5f), 0, 1e-3);
-    EXPECT_NEAR(angle(w * 0.5f - 0.5f, -0.5f), M_PI / 4, 1e-3);           // the upper edge
-    EXPECT_NEAR(std::tan(angle(-0.5f, h * 0.5f - 0.5f)), 2, 1e-3);        // the left one, twice as far out
+    EXPECT_NEAR(angle(w * 0.5f - 0.5f, -0.5f), M_PI / 4, 1e-3);     // the upper edge
+    EXPECT_NEAR(std::tan(angle(-0.5f, h * 0.5f - 0.5f)), 2, 1e-3);  // the left one, twice as far out
     EXPECT_GT(fly.ray(150, 50, w, h).direction.x, 0);
     EXPECT_GT(fly.ray(100, 10, w, h).direction.y, 0);
 }

@@ -74,6 +74,7 @@ TEST_F(SessionOnAPillar, WhatIsCutOffFallsAndUndoPutsTheWorldBack) {
     ASSERT_TRUE(redone && *redone);
     EXPECT_EQ(session_->world_hash(), dug);
     ok(session_->advance(0, 1e9));
+    run(1);
     EXPECT_EQ(session_->counts().bodies, 1);
     EXPECT_FALSE(*session_->redo());
 }
@@ -88,16 +89,51 @@ TEST_F(SessionOnAPillar, APlayThatIsRunAgainIsWhereItWas) {
     run(1);
     (void)session_->play().frame(Camera{});
     EXPECT_NE(drop(), before);  // it falls
-    stroke({3, 0, 3});
-    ASSERT_TRUE(*session_->undo());
-    ok(session_->advance(0, 1e9));
-    EXPECT_EQ(session_->steps(), 16);
-    (void)session_->play().frame(Camera{});
-    const float again = drop();
+    const float now = drop();
+    Edit ball;
+    ball.node.shape = Sphere{.radius = 0.2f};
+    ball.node.transform.position = {3, 3, 0};
+    ok(session_->launch(ball, {}));
     run(1);
-    (void)session_->play().frame(Camera{});
-    EXPECT_NE(drop(), again);
+    ASSERT_TRUE(*session_->undo());
+    EXPECT_EQ(session_->behind(), 17);
+    while (session_->behind() > 0) run(1);
+    EXPECT_EQ(session_->steps(), 17);
     EXPECT_EQ(session_->counts().parts, 1);
+    (void)session_->play().frame(Camera{});
+    const float later = drop();
+    EXPECT_GT(later, now);
+    // The same play, never interrupted.
+    const std::unique_ptr<Session> interrupted = std::move(session_);
+    std::filesystem::rename(file_, file_ + ".other");
+    std::ofstream(file_, std::ios::binary) << kPillar;
+    std::filesystem::remove(file_ + ".journal");
+    open();
+    run(3);
+    stroke();
+    run(14);
+    (void)session_->play().frame(Camera{});
+    EXPECT_EQ(drop(), later);
+}
+
+TEST_F(SessionOnAPillar, AStrokeThatCutsNothingLooseIsFilledInWhereTheBodiesAre) {
+    run(3);
+    const uint64_t before = session_->world_hash();
+    stroke({3, 0, 3});
+    run(2);
+    const auto depth = [&] {
+        (void)session_->play().frame(Camera{});
+        return session_->play().cast({.origin = {3, 5, 3}, .direction = {0, -1, 0}})->t;
+    };
+    EXPECT_NEAR(depth(), 5.4f, 0.05f);
+    ASSERT_TRUE(*session_->undo());
+    EXPECT_EQ(session_->behind(), 0);
+    EXPECT_EQ(session_->world_hash(), before);
+    EXPECT_NEAR(depth(), 5, 1e-3f);
+    ASSERT_TRUE(*session_->redo());
+    run(1);
+    EXPECT_NEAR(depth(), 5.4f, 0.05f);
+    EXPECT_EQ(session_->undo_depth(), 1);
 }
 
 TEST_F(SessionOnAPillar, RestartBeginsWithTheGroundAsItWasLeft) {

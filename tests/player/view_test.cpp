@@ -53,8 +53,8 @@ protected:
         std::ofstream(folder_ / name, std::ios::binary) << text;
     }
     Outcome run(const std::string& words, const std::string& display = "SDL_VIDEODRIVER=dummy DISPLAY=") {
-        const std::string command = "cd '" + folder_.string() + "' && " + display + " WAYLAND_DISPLAY= '" KILN_PROGRAM "' " +
-                                    words + " >.out 2>.err";
+        const std::string command = "cd '" + folder_.string() + "' && " + display +
+                                    " WAYLAND_DISPLAY= '" KILN_PROGRAM "' " + words + " >.out 2>.err";
         const int status = std::system(command.c_str());
         EXPECT_EQ(read(".out"), "");
         return {WIFEXITED(status) ? WEXITSTATUS(status) : 1000 + WTERMSIG(status), read(".err")};
@@ -120,6 +120,37 @@ TEST_F(View, GpuAReplayDigsWhatIsCutFallsAndUndoPutsTheWorldBackTheSameOnEveryRu
     EXPECT_EQ(read("a.jsonl"), read("b.jsonl"));
 }
 
+TEST_F(View, SlowGpuTheQuarryIsDugAndUndoneTheSameOnEveryRun) {
+    write("quarry.jsonl", R"({"frame": 1, "mouse": [32, 16], "button": "left", "down": true}
+{"frame": 2, "button": "left", "down": false}
+{"frame": 3, "key": "g", "down": true}
+{"frame": 6, "key": "left ctrl", "down": true}
+{"frame": 6, "key": "z", "down": true}
+{"frame": 7, "key": "z", "down": true}
+)");
+    const std::string words = "view quarry --size 64x36 --frames 9 --keys quarry.jsonl ";
+    const Outcome one = run(words + "--screenshot a.png --ui-json a.jsonl");
+    ASSERT_EQ(one.code, 0) << one.err;
+    const std::string start = value("a.jsonl", 0, "world");
+    const int bodies = std::stoi(value("a.jsonl", 0, "bodies"));
+    EXPECT_NE(value("a.jsonl", 3, "world"), start);
+    EXPECT_EQ(value("a.jsonl", 5, "bodies"), std::to_string(bodies + 1));  // the ball
+    EXPECT_EQ(value("a.jsonl", 5, "undo_depth"), "2");
+    EXPECT_EQ(value("a.jsonl", 6, "bodies"), std::to_string(bodies));
+    EXPECT_NE(value("a.jsonl", 6, "world"), start);
+    EXPECT_EQ(value("a.jsonl", 8, "world"), start);
+    EXPECT_EQ(value("a.jsonl", 8, "steps"), "9");
+    ASSERT_EQ(run(words + "--screenshot b.png --ui-json b.jsonl").code, 0);
+    EXPECT_EQ(read("a.png"), read("b.png"));
+    EXPECT_EQ(read("a.jsonl"), read("b.jsonl"));
+}
+
+TEST_F(View, GpuADemoWithoutADisplayIsAPicture) {
+    const Outcome o = run("demo tumble --size 16x9");
+    ASSERT_EQ(o.code, 0) << o.err;
+    EXPECT_GT(read("tumble.png").size(), 60u);
+}
+
 TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
     write("keys.jsonl", R"({"frame": 0, "key": "f1", "down": true}
 {"frame": 0, "key": "f2", "down": true}
@@ -136,7 +167,8 @@ TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
 {"frame": 10, "wheel": 1}
 {"frame": 11, "key": "escape", "down": true}
 )");
-    const Outcome o = run("view pillar.kiln.json --size 64x36 --frames 99 --keys keys.jsonl --screenshot a.png --ui-json a.jsonl");
+    const Outcome o =
+        run("view pillar.kiln.json --size 64x36 --frames 99 --keys keys.jsonl --screenshot a.png --ui-json a.jsonl");
     ASSERT_EQ(o.code, 0) << o.err;
     EXPECT_EQ(value("a.jsonl", 0, "bodies"), "0");
     EXPECT_EQ(value("a.jsonl", 1, "bodies"), "1");
@@ -159,7 +191,8 @@ TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
 
 TEST_F(View, GpuAWindowShowsThePicturesOfAReplayWithoutOne) {
     const VirtualDisplay display;
-    const std::string words = "view pillar.kiln.json --size 64x36 --frames 5 --keys dig.jsonl --validation --screenshot ";
+    const std::string words =
+        "view pillar.kiln.json --size 64x36 --frames 5 --keys dig.jsonl --validation --screenshot ";
     const Outcome shown = run(words + "a.png", "DISPLAY=" + display.name());
     ASSERT_EQ(shown.code, 0) << shown.err;
     std::filesystem::remove(folder_ / "pillar.kiln.json.journal");

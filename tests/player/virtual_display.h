@@ -34,8 +34,8 @@ public:
             ::dup2(nowhere, 0), ::dup2(nowhere, 1), ::dup2(nowhere, 2);
             ::close(ends[0]);
             const std::string fd = std::to_string(ends[1]), folder = folder_.string();
-            ::execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "640x480x24", "-nolisten", "tcp", "-noreset",
-                     "-fbdir", folder.c_str(), static_cast<char*>(nullptr));
+            ::execlp("Xvfb", "Xvfb", "-displayfd", fd.c_str(), "-screen", "0", "640x480x24", "-nolisten", "tcp",
+                     "-noreset", "-fbdir", folder.c_str(), static_cast<char*>(nullptr));
             ::_exit(127);
         }
         ::close(ends[1]);
@@ -75,7 +75,8 @@ public:
         };
         Screen out;
         if (bytes.size() < 100) return out;
-        const size_t begin = word(0) + size_t{word(19)} * 12, row = word(12);  // after the header and the table of colours
+        const size_t begin = word(0) + size_t{word(19)} * 12,
+                     row = word(12);  // after the header and the table of colours
         out.width = int(word(4));
         out.height = int(word(5));
         for (size_t y = 0; y < size_t(out.height); ++y)

@@ -108,8 +108,8 @@ TEST_F(NullSurface, OnlyTexturesOfSurfacesArePresented) {
     const TextureHandle plain =
         must(device_->create_texture({.size = {2, 2}, .usage = TextureUsage::CopyDst, .label = "plain"}));
     const std::vector<uint32_t> texels(4);
-    EXPECT_FALSE(device_->write_texture(
-        {.place = {.texture = plain}, .size = {2, 2}, .after = Access::Present}, bytes_of(texels)));
+    EXPECT_FALSE(device_->write_texture({.place = {.texture = plain}, .size = {2, 2}, .after = Access::Present},
+                                        bytes_of(texels)));
     EXPECT_TRUE(complained("Present"));
     device_->destroy(plain);
 }

@@ -48,13 +48,13 @@ Result<SurfaceImage> ValidateDevice::acquire(SurfaceHandle surface) {
     Result<SurfaceImage> out = below_->acquire(surface);
     if (!out || out->state != SurfaceState::Ready) return out;
     s->acquired = out->texture;
-    objects_.textures.set(out->texture, {.label = s->label,
-                                         .desc = {.format = out->format,
-                                                  .size = {out->width, out->height},
-                                                  .usage = TextureUsage::CopyDst},
-                                         .need = {},
-                                         .whole = {},
-                                         .shown = true});
+    objects_.textures.set(
+        out->texture,
+        {.label = s->label,
+         .desc = {.format = out->format, .size = {out->width, out->height}, .usage = TextureUsage::CopyDst},
+         .need = {},
+         .whole = {},
+         .shown = true});
     tracker_.add(out->texture);
     return out;
 }
@@ -63,11 +63,10 @@ Result<SurfaceState> ValidateDevice::present(SurfaceHandle surface) {
     SurfaceInfo* s = objects_.surfaces.find(surface);
     if (!s) return refuse("present: " + objects_.surfaces.why_not(surface));
     if (!s->acquired) return refuse(formatted("present: '{}' has no texture; acquire one", s->label));
-    const bool submitted = std::none_of(written_textures_.begin(), written_textures_.end(),
-                                        [&](const TextureWrite& w) { return w.place.texture == s->acquired; });
-    if (!submitted || !tracker_.ready_to_present(s->acquired))
-        return refuse(formatted("present: nothing that was submitted left the texture of '{}' ready for Present",
-                                s->label));
+    // Writes are learnt of when they are submitted.
+    if (!tracker_.ready_to_present(s->acquired))
+        return refuse(
+            formatted("present: nothing that was submitted left the texture of '{}' ready for Present", s->label));
     expire(std::exchange(s->acquired, {}));
     return below_->present(surface);
 }

@@ -33,10 +33,12 @@ VkCompositeAlphaFlagBitsKHR choose_alpha(VkCompositeAlphaFlagsKHR can) {
 
 Result<SurfaceHandle> VulkanDevice::create_surface(const SurfaceDesc& desc) {
     if (!instance_->windows().destroy || !desc.make)
-        return Error{formatted("surface '{}': the device was made without a window (DeviceOptions::window)", desc.label),
-                     ErrorKind::Usage};
+        return Error{
+            formatted("surface '{}': the device was made without a window (DeviceOptions::window)", desc.label),
+            ErrorKind::Usage};
     const uint64_t made = desc.make(instance_->vk());
-    if (made == 0) return Error{formatted("surface '{}': the window system made none", desc.label), ErrorKind::NoDevice};
+    if (made == 0)
+        return Error{formatted("surface '{}': the window system made none", desc.label), ErrorKind::NoDevice};
     const auto vk = VkSurfaceKHR(made);
     VkBool32 can = VK_FALSE;
     const VkResult r = instance_->windows().support(adapter_.physical, adapter_.queue_family, vk, &can);
@@ -114,7 +116,8 @@ Result<SurfaceState> VulkanDevice::configure(SurfaceHandle handle, const Surface
     windows.modes(adapter_.physical, s->vk, &count, nullptr);
     std::vector<VkPresentModeKHR> modes(count);
     windows.modes(adapter_.physical, s->vk, &count, modes.data());
-    const bool mailbox = settings.mode == PresentMode::Mailbox && std::ranges::count(modes, VK_PRESENT_MODE_MAILBOX_KHR);
+    const bool mailbox =
+        settings.mode == PresentMode::Mailbox && std::ranges::count(modes, VK_PRESENT_MODE_MAILBOX_KHR);
     uint32_t images = can.minImageCount + 1;
     if (can.maxImageCount > 0) images = std::min(images, can.maxImageCount);
 
@@ -175,15 +178,13 @@ Result<SurfaceImage> VulkanDevice::acquire(SurfaceHandle handle) {
     arrivals_.push_back(arrival.semaphore);
     arrival.waited_for_by = last_submit_ + 1;
     s->next_arrival = (s->next_arrival + 1) % s->arrivals.size();
-    s->acquired = textures_.insert({.label = s->label,
-                                    .desc = {.format = s->format,
-                                             .size = {s->width, s->height},
-                                             .mips = 1,
-                                             .usage = TextureUsage::CopyDst},
-                                    .vk = s->images[s->image],
-                                    .memory = {},
-                                    .whole = {},
-                                    .shown = true});
+    s->acquired = textures_.insert(
+        {.label = s->label,
+         .desc = {.format = s->format, .size = {s->width, s->height}, .mips = 1, .usage = TextureUsage::CopyDst},
+         .vk = s->images[s->image],
+         .memory = {},
+         .whole = {},
+         .shown = true});
     return SurfaceImage{SurfaceState::Ready, s->acquired, s->format, s->width, s->height};
 }
 
@@ -196,9 +197,8 @@ Result<SurfaceState> VulkanDevice::present(SurfaceHandle handle) {
     const VkSemaphoreSubmitInfo signal{.sType = VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO,
                                        .semaphore = s->drawn[s->image],
                                        .stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT};
-    const VkSubmitInfo2 drawn{.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO_2,
-                              .signalSemaphoreInfoCount = 1,
-                              .pSignalSemaphoreInfos = &signal};
+    const VkSubmitInfo2 drawn{
+        .sType = VK_STRUCTURE_TYPE_SUBMIT_INFO_2, .signalSemaphoreInfoCount = 1, .pSignalSemaphoreInfos = &signal};
     if (const VkResult r = vk_.vkQueueSubmit2(queue_, 1, &drawn, VK_NULL_HANDLE); r != VK_SUCCESS)
         return fail("present", r);
     const VkPresentInfoKHR info{.sType = VK_STRUCTURE_TYPE_PRESENT_INFO_KHR,
