@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -74,6 +75,7 @@ public:
     Result<void> run();
     // Says what is not saved, however it ended.
     void leave() const;
+    const PlayerOptions& options() const { return o_; }
 
 private:
     Result<void> take_events();
@@ -416,11 +418,28 @@ void Player::leave() const {
 
 }  // namespace
 
+namespace {
+
+const Player* running = nullptr;
+
+// A window system whose server is gone ends the process itself (Xlib: exit), from within any of its calls.
+void ended_from_below() {
+    if (!running) return;
+    running->options().say("kiln: the display was lost");
+    std::exchange(running, nullptr)->leave();
+}
+
+}  // namespace
+
 Result<void> run_player(const PlayerOptions& options) {
+    static const int registered = std::atexit(ended_from_below);
+    (void)registered;
     Player player(options);
     if (auto opened = player.open(); !opened) return opened;
+    running = &player;
     auto done = player.run();
     player.leave();
+    running = nullptr;
     return done;
 }
 
