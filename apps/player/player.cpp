@@ -12,6 +12,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <limits>
 #include <memory>
@@ -47,6 +48,7 @@ constexpr Rung kRungs[] = {{1, 1, true},     {1, 0.5f, true},  {2, 0.5f, true},
 constexpr int kRungOfProcessor = 2;
 constexpr double kSlow = 0.066, kQuick = 0.012;  // seconds a frame
 constexpr int kFramesARung = 40;                 // a change costs the picture's history
+constexpr double kSecondsARung = 2;              // … and frames that take long are not waited for so often
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
 
 std::string digits(const char* format, double value) {
@@ -74,6 +76,7 @@ public:
     Result<void> run();
     // Says what is not saved, however it ended.
     void leave() const;
+    const PlayerOptions& options() const { return o_; }
 
 private:
     Result<void> take_events();
@@ -117,7 +120,7 @@ private:
     vec3 bite_towards_{};
     float speed_ = 4;  // m/s
     bool paused_ = false, profiler_ = false, done_ = false;
-    double frame_seconds_ = 0, work_seconds_ = 0;  // smoothed; work: without waiting for the screen
+    double frame_seconds_ = 0, work_seconds_ = 0, rung_seconds_ = 0;  // smoothed; work: without waiting for the screen
     size_t rung_ = 0;
     int rung_since_ = 0;  // frame
     std::string ui_;
@@ -129,6 +132,12 @@ Result<void> Player::open() {
         if (!events) return events.error();
         events_ = std::move(*events);
     }
+    auto session = Session::open(o_.scene, o_.backend);
+    if (!session) return session.error();
+    session_ = std::move(*session);
+    auto camera = session_->world().camera(o_.camera);
+    if (!camera) return camera.error();
+    camera_.emplace(*camera);
     if (o_.window) {
         auto window = Window::open(o_.scene + " - Kiln", o_.width, o_.height);
         if (!window) return window.error();
@@ -143,13 +152,7 @@ Result<void> Player::open() {
         o_.quality = renderer_->best_quality();
         if (o_.quality == Quality::Medium) rung_ = kRungOfProcessor;
     }
-    auto session = Session::open(o_.scene, o_.backend);
-    if (!session) return session.error();
-    session_ = std::move(*session);
     if (!session_->note().empty()) o_.say(session_->note());
-    auto camera = session_->world().camera(o_.camera);
-    if (!camera) return camera.error();
-    camera_.emplace(*camera);
     width_ = o_.width;
     height_ = o_.height;
     input_.x = float(width_) / 2;
@@ -177,14 +180,16 @@ RenderSettings Player::settings() const {
 
 void Player::choose_rung(double seconds) {
     work_seconds_ = work_seconds_ > 0 ? 0.9 * work_seconds_ + 0.1 * seconds : seconds;
-    if (!o_.choose_quality || replays() || frame_ - rung_since_ < kFramesARung) return;
+    rung_seconds_ += seconds;
+    if (!o_.choose_quality || replays()) return;
+    if (frame_ - rung_since_ < kFramesARung && rung_seconds_ < kSecondsARung) return;
     const bool slow = work_seconds_ > kSlow && rung_ + 1 < std::size(kRungs);
     // Up only where four times the work would not be slow.
     const bool quick = work_seconds_ < kQuick && rung_ > 0;
     if (!slow && !quick) return;
     rung_ = slow ? rung_ + 1 : rung_ - 1;
     rung_since_ = frame_;
-    work_seconds_ = 0;
+    work_seconds_ = rung_seconds_ = 0;
 }
 
 Result<void> Player::take_events() {
@@ -416,11 +421,28 @@ void Player::leave() const {
 
 }  // namespace
 
+namespace {
+
+const Player* running = nullptr;
+
+// A window system whose server is gone ends the process itself (Xlib: exit), from within any of its calls.
+void ended_from_below() {
+    if (!running) return;
+    running->options().say("kiln: the display was lost");
+    std::exchange(running, nullptr)->leave();
+}
+
+}  // namespace
+
 Result<void> run_player(const PlayerOptions& options) {
+    static const int registered = std::atexit(ended_from_below);
+    (void)registered;
     Player player(options);
     if (auto opened = player.open(); !opened) return opened;
+    running = &player;
     auto done = player.run();
     player.leave();
+    running = nullptr;
     return done;
 }
 

@@ -30,7 +30,7 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
     if (!is_bundled) {
         world = World::open(scene);
         out->journaled_ = bool(world);
-        out->own_file_ = true;
+        out->own_file_ = out->journaled_;
         if (!world && world.error().kind == ErrorKind::Input) return world.error();
         if (!world) out->note_ = world.error().message + "; what is changed is kept only by saving";
     }

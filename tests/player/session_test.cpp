@@ -239,6 +239,16 @@ TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
     std::filesystem::current_path(here);
 }
 
+TEST_F(SessionOnAPillar, AFileThatAnotherProgramEditsIsPlayedAndNotWrittenOver) {
+    auto other = Session::open(file_, "");
+    ASSERT_TRUE(other) << other.error().message;
+    EXPECT_NE((*other)->note().find("kept only by saving"), std::string::npos) << (*other)->note();
+    (*other)->begin_stroke("dig");
+    ok((*other)->dig(kMiddle, 0.3f, false));
+    EXPECT_FALSE((*other)->save());
+    EXPECT_NE((*other)->farewell(), "");
+}
+
 TEST(Session, BadScenesAreNamed) {
     const auto nothing = Session::open("/nonexistent/scene.kiln.json", "");
     ASSERT_FALSE(nothing);

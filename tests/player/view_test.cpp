@@ -201,6 +201,30 @@ TEST_F(View, GpuAWindowShowsThePicturesOfAReplayWithoutOne) {
     EXPECT_GT(read("a.png").size(), 100u);
 }
 
+TEST_F(View, GpuADisplayThatIsTakenAwayEndsWellAndTheJournalHasWhatWasDug) {
+    VirtualDisplay display;
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const std::string command = "cd '" + folder_.string() +
+                                    "' && exec '" KILN_PROGRAM
+                                    "' view pillar.kiln.json --size 64x36 --keys dig.jsonl 2>.err";
+        ::execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+        ::_exit(127);
+    }
+    // The journal grows when the stroke begins.
+    const auto dug = [&] { return read("pillar.kiln.json.journal").find("dig2") != std::string::npos; };
+    int status = 0;
+    while (!dug() && ::waitpid(child, &status, WNOHANG) == 0) ::usleep(1000);
+    EXPECT_TRUE(dug());
+    display.take_away();
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) != 0) << status;
+    EXPECT_THAT(read(".err"), HasSubstr("journal has what was changed"));
+    const Outcome again = run("view pillar.kiln.json --size 64x36 --frames 1 --ui-json a.jsonl");
+    EXPECT_EQ(again.code, 0) << again.err;
+    EXPECT_THAT(again.err, HasSubstr("pillar.kiln.json"));
+}
+
 TEST_F(View, GpuADisplayThatIsNotThereEndsWellOrDrawsWithoutAWindow) {
     const std::string nowhere = "SDL_VIDEODRIVER=x11 DISPLAY=:32123";
     const Outcome without = run("view pillar.kiln.json", nowhere);

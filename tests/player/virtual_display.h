@@ -58,6 +58,8 @@ public:
     VirtualDisplay(const VirtualDisplay&) = delete;
     VirtualDisplay& operator=(const VirtualDisplay&) = delete;
 
+    /// Ends the server, as a crash would.
+    void take_away() { ::kill(server_, SIGKILL); }
     std::string name() const { return ":" + number_; }
 
     struct Screen {

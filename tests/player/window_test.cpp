@@ -94,7 +94,7 @@ TEST_F(WindowGpu, ASecondWindowComesAfterTheFirst) {
     }
 }
 
-TEST(Window, WithoutADisplayThereIsNone) {
+TEST(Window, GpuWithoutADisplayThereIsNone) {
     for (const char* name : {"DISPLAY", "WAYLAND_DISPLAY", "SDL_VIDEODRIVER"}) ::unsetenv(name);
     EXPECT_FALSE(Window::has_display());
     ::setenv("DISPLAY", ":0", 1);
