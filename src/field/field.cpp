@@ -125,8 +125,12 @@ private:
             } else if (std::none_of(dirty.begin(), dirty.end(), has_cell)) {
                 return false;
             }
-            const bool may_own = std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
-            return may_own || (builder.old_->cells_.at(cell.x, cell.y, cell.z) & kCellOccupied) != 0;
+            const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
+            if ((word & kCellOccupied) != 0) {
+                builder.ask_for(word & kCellSlotMask);
+                return true;
+            }
+            return std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {
@@ -188,6 +192,12 @@ private:
             result.leaves.push_back(std::move(leaf));
         }
     };
+
+    // What will be read of a brick, once its cell has been folded.
+    void ask_for(uint32_t slot) const {
+        __builtin_prefetch(&old_->records_[slot]);
+        if (stored_ != nullptr) __builtin_prefetch(&(*stored_)[slot]);
+    }
 
     CellLattice lattice() const { return {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}; }
     CellMaker maker() const { return {*program_, lattice(), inserted_}; }

@@ -26,8 +26,7 @@ Edit small_edit(worlds::Random& r) {
 TEST(StillTexels, WhatIsNotBakedIsWhatARebuildHas) {
     for (const uint32_t seed : {1u, 2u}) {
         worlds::Random r(seed);
-        worlds::World world{
-            "crowd", {}, {.voxel_size = 0.03f, .bounds = {{-0.9f, -0.9f, -0.9f}, {0.9f, 0.9f, 0.9f}}}};
+        worlds::World world{"crowd", {}, {.voxel_size = 0.03f, .bounds = {{-0.9f, -0.9f, -0.9f}, {0.9f, 0.9f, 0.9f}}}};
         if (seed == 2) world.options.own_voxels = 4;
         for (int i = 0; i < 80; ++i) world.edits.push_back(small_edit(r));
         worlds::Live live(world.edits);
@@ -60,6 +59,30 @@ TEST(StillTexels, WhatIsNotBakedIsWhatARebuildHas) {
             ASSERT_EQ(host.hash(), full.hash()) << "seed " << seed << " step " << step;
         }
         EXPECT_LT(baked, without) << "seed " << seed;
+    }
+}
+
+// Hollows just under a surface, and lumps just above: what comes and goes is near, in bricks that hold something else.
+TEST(StillTexels, HollowsUnderASurfaceAreWhatARebuildHas) {
+    worlds::Random r(9);
+    worlds::World world{"ball", {}, {.voxel_size = 0.03f, .bounds = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}}};
+    world.edits.push_back(worlds::edit(Sphere{.radius = 0.5f}, {}));
+    worlds::Live live(world.edits);
+    HostBricks host = *HostBricks::build(live.program(), world.options);
+    for (int step = 0; step < 150; ++step) {
+        std::vector<Edit>& edits = world.edits;
+        if (edits.size() > 5) {
+            edits.erase(edits.begin() + 1);
+        } else {
+            const bool cut = step % 3 != 0;
+            const float radius = 0.03f * r.in(0.7f, 5), far = 0.03f * r.in(-1, 6) + radius;
+            edits.push_back(worlds::edit(Sphere{.radius = radius},
+                                         normalize(r.point(1)) * (cut ? 0.5f - far : 0.5f + 0.4f * far),
+                                         cut ? Op::Subtract : Op::Union, step % 2 == 0 ? 0.04f : 0.0f));
+        }
+        const std::vector<RowChange> changes = live.become(edits);
+        ASSERT_TRUE(host.update(live.program(), changes));
+        ASSERT_EQ(host.hash(), HostBricks::bake(world.field()).hash()) << "step " << step;
     }
 }
 

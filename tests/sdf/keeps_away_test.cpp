@@ -52,7 +52,9 @@ TEST(KeepsAway, SaysWhatALoopOverTheTexelsSaysOnEveryInstructionSet) {
             store_halves(near, 1 / kVoxel, 4.0f, 6.103515625e-5f, codes.data(), solid.data(), Isa::Scalar);
             bool expected = true;
             for (size_t i = 0; i < 512; ++i) {
-                const float size = codes[i] % 0x8000 == 0 ? 0.0f : std::ldexp(float(codes[i] % 0x400 | 0x400), codes[i] / 0x400 % 32 - 25);
+                const float size = codes[i] % 0x8000 == 0
+                                       ? 0.0f
+                                       : std::ldexp(float(codes[i] % 0x400 | 0x400), codes[i] / 0x400 % 32 - 25);
                 const float w = sign * (codes[i] >= 0x8000 ? -size : size);
                 expected = expected && (value[i] / kVoxel > w + margin || !(w > floor));
             }
