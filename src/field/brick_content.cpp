@@ -55,13 +55,6 @@ private:
     int heaviest_slot_ = 0;
 };
 
-template <typename Code>
-uint32_t keep_solid(BrickCodes<Code>& brick, const std::array<Slice, 8>& texels) {
-    const SolidVoxels found = solid_voxels(texels);
-    brick.solid = found.rows;
-    return found.box;
-}
-
 uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; }
 
 }  // namespace
@@ -73,17 +66,31 @@ double texel_position(int texel, float voxel_size) {
     return std::round(double(texel) * double(voxel_size) / step) * step;
 }
 
+void BrickEvaluator::place(ivec3 first) {
+    const auto place_axis = [this](float* to, int begin, float origin) {
+        if (origin == 0) {
+            for (int i = 0; i < kBrickTexels; ++i) to[i] = float(begin + i) * voxel_size_;
+        } else {
+            for (int i = 0; i < kBrickTexels; ++i)
+                to[i] = float(texel_position(begin + i, voxel_size_) - double(origin));
+        }
+    };
+    // Never corner + i * h: neighbours must see the same position.
+    place_axis(x_, first.x, origin_.x);
+    place_axis(y_, first.y, origin_.y);
+    place_axis(z_, first.z, origin_.z);
+}
+
 float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 first) {
     code_ = code;
-    const auto position = [&](int texel, float origin) {
-        return origin == 0 ? float(texel) * voxel_size_ : float(texel_position(texel, voxel_size_) - double(origin));
-    };
-    for (int i = 0; i < kBrickTexels; ++i) {
-        x_[i] = position(first.x + i, origin_.x);  // never corner + i * h: neighbours must see the same position
-        y_[i] = position(first.y + i, origin_.y);
-        z_[i] = position(first.z + i, origin_.z);
-    }
+    place(first);
     return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
+}
+
+bool BrickEvaluator::keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from) {
+    place(first);
+    from.scale = voxels_per_metre_;
+    return sdf::keeps_away(sdf::view(*program_, edit), x_, y_, z_, from);
 }
 
 BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16_t> only) const {
@@ -93,12 +100,12 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
         std::array<Slice, 8> solid;
         sdf::store_halves(distances_, voxels_per_metre_, kBandVoxels, kHalfStepVoxels, brick.codes.data(),
                           solid.data());
-        out.solid_box = keep_solid(brick, solid);
+        out.solid_box = solid_voxels(solid, brick.solid);
     } else {
         ByteCodes& brick = out.bytes.renew();
         for (size_t i = 0; i < brick.codes.size(); ++i)
             brick.codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
-        out.solid_box = keep_solid(brick, solid_texels(std::as_bytes(std::span(brick.codes)).data(), 1));
+        out.solid_box = solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), 1), brick.solid);
     }
     if (only) {
         out.material = *only;

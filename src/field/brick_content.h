@@ -22,8 +22,8 @@ enum class DistanceFormat : uint8_t { Half, Snorm8 };
 /// 512 codes, x fastest, then y, then z; before them what a ray asks first. Behind the count of a Shared, codes begin a cache line.
 template <typename Code>
 struct BrickCodes {
-    SolidRows solid{};
-    std::array<Code, kBrickTexelCount> codes{};
+    SolidRows solid;
+    std::array<Code, kBrickTexelCount> codes;
 };
 using HalfCodes = BrickCodes<uint16_t>;
 using ByteCodes = BrickCodes<uint8_t>;
@@ -49,6 +49,11 @@ struct BrickContent {
     uint32_t solid_box = kNoSolidBox;
 
     explicit operator bool() const { return half || bytes; }
+    void prefetch() const {
+        half.prefetch();
+        bytes.prefetch();
+        materials.prefetch();
+    }
     const std::byte* codes() const {
         return half ? std::as_bytes(std::span(half->codes)).data() : std::as_bytes(std::span(bytes->codes)).data();
     }
@@ -68,8 +73,8 @@ struct BrickContent {
 /// agree about the texels they share.
 double texel_position(int texel, float voxel_size);
 inline constexpr int kNearCells = 2048;
-/// By slot.
-using BrickContents = PagedArray<BrickContent, 16>;
+/// By slot. Pages are small: whoever copies one counts a holder more of each of its bricks.
+using BrickContents = PagedArray<BrickContent, 4>;
 
 /// Evaluates bricks, one after another. One thread.
 class BrickEvaluator {
@@ -82,10 +87,13 @@ public:
     float evaluate(std::span<const sdf::Instruction> code, ivec3 first);
     /// Of the last evaluate(), metres, not clamped.
     const std::array<float, kBrickTexelCount>& distances() const { return distances_; }
+    /// sdf::keeps_away() at the texels of the brick that begins at `first`. `from`: in voxels; its scale is set here.
+    bool keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from);
     /// Of the last evaluate(): what is stored. `only`: the material of all texels, where one knows.
     BrickContent content(DistanceFormat format, std::optional<uint16_t> only = {}) const;
 
 private:
+    void place(ivec3 first);
     BrickMaterials materials() const;
 
     const sdf::Program* program_;

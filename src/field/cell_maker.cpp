@@ -110,10 +110,9 @@ bool CellMaker::beyond(float value, const sdf::Balls& balls) const {
     return v > balls.radius + lattice_.own_voxels * lattice_.voxel_size + 4e-6f * (lattice_.farthest + v);
 }
 
-// The cell of ball i; whether it owns a brick.
-bool CellMaker::evaluate(ivec3 cell, int i) {
-    culler_.emit(cells_, i, code_);
-    ball_ = i;
+// The cell of the ball at hand; whether it owns a brick.
+bool CellMaker::evaluate(ivec3 cell) {
+    emit_code();
     ++cells_evaluated_;
     const ivec3 at = cell + lattice_.first;
     const float least = evaluator_.evaluate(code_, {at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels});

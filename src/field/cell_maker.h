@@ -62,6 +62,9 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 ///     void air(const CellBox& cells)        these are empty and outside, also those it does not want
 ///     void empty(ivec3 cell, bool inside)
 ///     bool keeps(ivec3 cell, Inserted, ListCuller::Start)    it is as it was
+/// and, of run_box() alone,
+///     uint64_t may_stay(const CellMaker&)         of the cells centres() are of, a bit each: those to ask the next about
+///     bool texels_stay(ivec3 cell, CellMaker&)    it has a brick, with another code but the same texels, and has taken it
 ///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
 enum class Inserted : uint8_t {
     Shows,    ///< one of the edits that came is in the code of the cell
@@ -95,6 +98,15 @@ public:
     }
     uint32_t code_count() const { return uint32_t(code_.size()); }
     const BrickEvaluator& evaluator() const { return evaluator_; }
+    BrickEvaluator& evaluator() { return evaluator_; }
+    /// Of run_box(): the edits that reach the box, in order.
+    std::span<const uint32_t> rows() const { return rows_; }
+    /// Balls round the cells at hand, and the program's values at their centres.
+    const sdf::Balls& centres() const { return cells_.balls; }
+    const float* values() const { return cells_.value; }
+    ivec3 cell(int ball) const { return cell_[ball]; }
+    /// Of the cell that a sink is asked about: makes its code.
+    void emit_code() { culler_.emit(cells_, ball_, code_); }
     std::optional<uint16_t> only_material() const { return culler_.only_material(cells_, ball_); }
     uint64_t cells_tested() const { return cells_tested_; }        ///< balls folded at any level of the hierarchy
     uint64_t cells_evaluated() const { return cells_evaluated_; }  ///< cells whose texels were looked at
@@ -112,9 +124,9 @@ private:
     void place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const;
     void size_balls(sdf::Balls& balls, int size) const;
     bool beyond(float value, const sdf::Balls& balls) const;
-    bool evaluate(ivec3 cell, int i);
-    template <typename Sink>
-    void run_cells(Sink& sink, bool whole_list);
+    bool evaluate(ivec3 cell);
+    template <bool kWholeList, typename Sink>
+    void run_cells(Sink& sink);
 
     const sdf::Program* program_;
     sdf::Rebased* rebased_;  // null where points count from the world's origin
@@ -182,7 +194,7 @@ void CellMaker::run_block(ivec3 at, const CellBox& bounds, Sink& sink) {
             place_ball(cells_.balls, c, cell_[c], 1);
             if (contains(bounds, cell_[c]) && sink.wants(cell_[c])) cells_.balls.live |= uint64_t(1) << c;
         }
-        run_cells(sink, false);
+        run_cells<false>(sink);
         culler_.drop(cells_.list);
     }
     culler_.drop(groups_.list);
@@ -197,7 +209,7 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
         if (n == 0) return;
         cells_.balls.live = n == 64 ? ~uint64_t(0) : (uint64_t(1) << n) - 1;
         for (int i = n; i < 64; ++i) place_ball(cells_.balls, i, cell_[n - 1], 1);
-        run_cells(sink, true);
+        run_cells<true>(sink);
         n = 0;
     };
     for (int z = box.min.z; z < box.max.z; ++z) {
@@ -215,9 +227,9 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
     culler_.drop(cells_.list);
 }
 
-// cells_ has its list, its balls' places and which of them to look at. `whole_list`: whatever reaches a cell is in the list.
-template <typename Sink>
-void CellMaker::run_cells(Sink& sink, bool whole_list) {
+// cells_ has its list, its balls' places and which of them to look at. kWholeList: whatever reaches a cell is in the list.
+template <bool kWholeList, typename Sink>
+void CellMaker::run_cells(Sink& sink) {
     size_balls(cells_.balls, 1);
     culler_.fold(cells_);
     uint64_t open = 0;
@@ -233,7 +245,9 @@ void CellMaker::run_cells(Sink& sink, bool whole_list) {
     if (open == 0) return;
     culler_.keep(cells_, open);
     const uint64_t shown = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
-    const uint64_t no_effect = whole_list ? culler_.balls_unchanged_by(cells_, inserted_) : 0;
+    const uint64_t no_effect = kWholeList ? culler_.balls_unchanged_by(cells_, inserted_) : 0;
+    uint64_t may_stay = 0;
+    if constexpr (kWholeList) may_stay = open & sink.may_stay(*this);
     for (int i = 0; i < 64; ++i) {
         if ((open >> i & 1u) == 0) continue;
         const Inserted inserted = (no_effect >> i & 1u) != 0 ? Inserted::NoEffect
@@ -241,7 +255,11 @@ void CellMaker::run_cells(Sink& sink, bool whole_list) {
                                                              : Inserted::Hidden;
         if (sink.keeps(cell_[i], inserted, culler_.start_of(cells_, i))) continue;
         if (sink.stop()) return;
-        if (evaluate(cell_[i], i)) {
+        ball_ = i;
+        if constexpr (kWholeList) {
+            if ((may_stay >> i & 1u) != 0 && sink.texels_stay(cell_[i], *this)) continue;
+        }
+        if (evaluate(cell_[i])) {
             sink.brick(cell_[i], *this);
         } else {
             sink.empty(cell_[i], evaluator_.distances()[0] < 0);

@@ -9,10 +9,12 @@
 #include "base/parallel_for.h"
 #include "base/profile.h"
 #include "field/cell_maker.h"
+#include "field/still_texels.h"
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <iterator>
 #include <string>
@@ -56,8 +58,14 @@ struct TaskResult {
 class FieldBuilder {
 public:
     FieldBuilder(const Field* old, std::shared_ptr<const sdf::Program> program, const FieldOptions& options,
-                 std::span<const RowChange> changes, MadeBricks* made)
-        : old_(old), program_(std::move(program)), options_(options), out_(new Field), changes_(changes), made_(made) {}
+                 std::span<const RowChange> changes, MadeBricks* made, const BrickContents* stored = nullptr)
+        : old_(old),
+          program_(std::move(program)),
+          options_(options),
+          out_(new Field),
+          changes_(changes),
+          made_(made),
+          stored_(stored) {}
 
     Result<std::shared_ptr<const Field>> run() {
         KILN_PROFILE(old_ != nullptr ? "field update" : "field build");
@@ -78,8 +86,9 @@ public:
             } else if (cells > 0) {
                 results_.resize(dirty_.size());
                 CellMaker maker = this->maker();
+                StillTexels still(*program_, options_.voxel_size, reached_);
                 for (size_t i = 0; i < dirty_.size(); ++i) {
-                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i), {}, was_reached_};
+                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i), {}, was_reached_, &still, false};
                     maker.run_box(dirty_[i], sink);
                 }
                 count(maker, results_[0]);
@@ -100,6 +109,8 @@ private:
         std::span<const CellBox> earlier = {};  // an update of few cells: boxes that have had their cells
         std::span<const CellBox> dirty = {};    // else: those that meet the task
         std::span<const CellBox> gone = {};     // where edits were that are gone, of those that may meet the task
+        StillTexels* still = nullptr;           // of an update of few cells
+        bool saw_rows = false;                  // still has those of the box at hand
 
         bool whole() const { return builder.old_ == nullptr; }
         bool wants(const CellBox& box) const {
@@ -114,8 +125,12 @@ private:
             } else if (std::none_of(dirty.begin(), dirty.end(), has_cell)) {
                 return false;
             }
-            const bool may_own = std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
-            return may_own || (builder.old_->cells_.at(cell.x, cell.y, cell.z) & kCellOccupied) != 0;
+            const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
+            if ((word & kCellOccupied) != 0) {
+                builder.ask_for(word & kCellSlotMask);
+                return true;
+            }
+            return std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {
@@ -138,6 +153,37 @@ private:
             return (word & kCellOccupied) != 0 && inserted != Inserted::Shows &&
                    stays(builder.old_->code_of(word & kCellSlotMask), *builder.program_, builder.removed_, start);
         }
+        const BrickContent* stored(ivec3 cell) const {
+            const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
+            return (word & kCellOccupied) != 0 ? &(*builder.stored_)[word & kCellSlotMask] : nullptr;
+        }
+        uint64_t may_stay(const CellMaker& maker) {
+            if (builder.stored_ == nullptr) return 0;
+            if (!saw_rows) still->see(maker.rows());
+            saw_rows = true;
+            const uint64_t likely = still->likely(maker.centres(), maker.values());
+            uint64_t out = 0;
+            for (uint64_t left = likely & maker.centres().live; left != 0; left &= left - 1) {
+                const int ball = std::countr_zero(left);
+                const BrickContent* const brick = stored(maker.cell(ball));
+                if (brick == nullptr || !brick->half) continue;
+                out |= left & -left;
+                // Codes come from far away: all are asked for before the first is looked at.
+                const auto* const codes = reinterpret_cast<const std::byte*>(brick->half->codes.data());
+                for (size_t at = 0; at < sizeof brick->half->codes; at += 64) __builtin_prefetch(codes + at);
+            }
+            return out;
+        }
+        bool texels_stay(ivec3 cell, CellMaker& maker) {
+            const ivec3 world = cell + builder.first_cell();
+            const ivec3 texel{world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels};
+            if (!still->hold(cell, texel, *stored(cell), maker.only_material(), maker.evaluator())) return false;
+            maker.emit_code();
+            const uint32_t first = uint32_t(result.code.size());
+            maker.append_code(result.code);
+            result.leaves.push_back({cell, first, maker.code_count(), false, {}});
+            return true;
+        }
         void brick(ivec3 cell, CellMaker& maker) {
             Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), true, {}};
             if (builder.made_ != nullptr)
@@ -146,6 +192,12 @@ private:
             result.leaves.push_back(std::move(leaf));
         }
     };
+
+    // What will be read of a brick, once its cell has been folded.
+    void ask_for(uint32_t slot) const {
+        __builtin_prefetch(&old_->records_[slot]);
+        if (stored_ != nullptr) __builtin_prefetch(&(*stored_)[slot]);
+    }
 
     CellLattice lattice() const { return {first_cell(), options_.voxel_size, options_.own_voxels, farthest(), {}}; }
     CellMaker maker() const { return {*program_, lattice(), inserted_}; }
@@ -210,7 +262,10 @@ private:
         const auto add = [&](uint32_t row, bool gone) {
             const CellsReached world = cells_reached(*program_, row, lattice(), gone);
             const CellBox box = on_grid(world.stored), owned = on_grid(world.owned);
-            if (!box.empty()) dirty_.push_back(box);
+            if (!box.empty()) {
+                dirty_.push_back(box);
+                reached_.push_back({row, gone, box});
+            }
             if (!owned.empty()) owned_.push_back(owned);
             return box;
         };
@@ -343,6 +398,7 @@ private:
                     out_->cells_.set(leaf.cell.x, leaf.cell.y, leaf.cell.z, kCellOccupied | slot);
                     if (old_ != nullptr) came.push_back(leaf.cell);
                 }
+                if (!leaf.bake) continue;
                 out_->jobs_.push_back(slot);
                 if (made_ != nullptr) made_->emplace_back(slot, std::move(leaf.content));
             }
@@ -396,8 +452,10 @@ private:
     std::shared_ptr<Field> out_;
     std::span<const RowChange> changes_;
     MadeBricks* made_;
+    const BrickContents* stored_;  // of old_, or null
     ivec3 size_;
     std::vector<CellBox> dirty_, was_reached_;
+    std::vector<StillTexels::Change> reached_;
     std::vector<CellBox> owned_;  // where cells may come to own a brick
     std::vector<uint32_t> removed_, inserted_;
     std::vector<ivec3> tasks_;
@@ -410,8 +468,9 @@ Result<std::shared_ptr<const Field>> Field::build(std::shared_ptr<const sdf::Pro
 }
 
 Result<std::shared_ptr<const Field>> Field::update(const Field& old, std::shared_ptr<const sdf::Program> program,
-                                                   std::span<const RowChange> changes, MadeBricks* made) {
-    return FieldBuilder(&old, std::move(program), old.options_, changes, made).run();
+                                                   std::span<const RowChange> changes, MadeBricks* made,
+                                                   const BrickContents* stored) {
+    return FieldBuilder(&old, std::move(program), old.options_, changes, made, stored).run();
 }
 
 std::vector<uint32_t> Field::slots() const {

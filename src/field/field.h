@@ -61,9 +61,11 @@ public:
                                                       const FieldOptions& options, MadeBricks* made = nullptr);
     /// The field of `program`, which is old.program() with `changes` made. Its bricks hold, bit for bit, what those of build(program) do;
     /// slot numbers and code may be others. Costs what the changed edits reach; jobs() are the bricks whose texels may have
-    /// changed, and `made`, if given, receives them. An intersect edit reaches everything.
+    /// changed, and `made`, if given, receives them. `stored`, if given, are the texels of old's bricks: fewer then seem to
+    /// change. An intersect edit reaches everything.
     static Result<std::shared_ptr<const Field>> update(const Field& old, std::shared_ptr<const sdf::Program> program,
-                                                       std::span<const RowChange> changes, MadeBricks* made = nullptr);
+                                                       std::span<const RowChange> changes, MadeBricks* made = nullptr,
+                                                       const BrickContents* stored = nullptr);
 
     const sdf::Program& program() const { return *program_; }
     const std::shared_ptr<const sdf::Program>& shared_program() const { return program_; }

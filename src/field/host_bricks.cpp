@@ -86,7 +86,7 @@ void HostBricks::update(std::shared_ptr<const Field> next, int workers, MadeBric
 
 Result<void> HostBricks::update(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes) {
     MadeBricks made;
-    auto next = Field::update(*field_, std::move(program), changes, &made);
+    auto next = Field::update(*field_, std::move(program), changes, &made, &contents_);
     if (!next) return next.error();
     update(std::move(*next), 0, &made);
     return {};

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "field/solid.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
 #ifdef __SSE2__
@@ -42,8 +43,7 @@ std::array<Slice, 8> solid_texels(const std::byte* codes, int texel_bytes) {
     return out;
 }
 
-SolidVoxels solid_voxels(const std::array<Slice, 8>& texels) {
-    SolidVoxels out;
+uint32_t solid_voxels(const std::array<Slice, 8>& texels, SolidRows& rows) {
     Slice all = 0;
     uint32_t slices = 0;  // bit z: some voxel is solid
     const auto voxels = [&](size_t z) {
@@ -55,21 +55,18 @@ SolidVoxels solid_voxels(const std::array<Slice, 8>& texels) {
         all |= any;
         return any;
     };
-    // Two at a time: whoever copies the rows loads as much, and a load that meets two stores waits for both.
-    for (size_t z = 0; z < 6; z += 2) {
-        const Slice two __attribute__((vector_size(16))) = {voxels(z), voxels(z + 1)};
-        std::memcpy(out.rows.data() + sizeof(Slice) * z, &two, sizeof two);
+    for (size_t z = 0; z < 7; ++z) {
+        const Slice slice = voxels(z);
+        std::memcpy(rows.data() + sizeof(Slice) * z, &slice, sizeof slice);
     }
-    const Slice last = voxels(6);
-    std::memcpy(out.rows.data() + sizeof(Slice) * 6, &last, sizeof last);
-    if (all == 0) return out;
+    std::fill(rows.begin() + 7 * sizeof(Slice), rows.end(), uint8_t(0));
+    if (all == 0) return kNoSolidBox;
     const int first_y = std::countr_zero(all) / 8, last_y = 7 - std::countl_zero(all) / 8;
     Slice columns = all | all >> 32;
     columns |= columns >> 16;
     columns = (columns | columns >> 8) & 0x7f;
-    out.box = solid_box({std::countr_zero(columns), first_y, std::countr_zero(slices)},
-                        {63 - std::countl_zero(columns), last_y, 31 - std::countl_zero(slices)});
-    return out;
+    return solid_box({std::countr_zero(columns), first_y, std::countr_zero(slices)},
+                     {63 - std::countl_zero(columns), last_y, 31 - std::countl_zero(slices)});
 }
 
 }  // namespace kiln::field

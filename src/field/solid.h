@@ -27,10 +27,7 @@ inline constexpr uint32_t solid_box(ivec3 first, ivec3 last) {
     return uint32_t(first.x | first.y << 3 | first.z << 6 | last.x << 9 | last.y << 12 | last.z << 15);
 }
 
-struct SolidVoxels {
-    SolidRows rows{};
-    uint32_t box = kNoSolidBox;
-};
-SolidVoxels solid_voxels(const std::array<Slice, 8>& texels);
+/// Fills the rows; the box.
+uint32_t solid_voxels(const std::array<Slice, 8>& texels, SolidRows& rows);
 
 }  // namespace kiln::field

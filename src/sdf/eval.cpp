@@ -130,6 +130,11 @@ float evaluate_brick(const TapeView& tape, const float* x, const float* y, const
                                             memory_of(tape.memory_slots, kChunkBytes));
 }
 
+bool keeps_away(const TapeView& tape, const float* x, const float* y, const float* z, const Away& from, Isa isa) {
+    return KILN_CHOOSE(isa, keeps_away)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z, from,
+                                        memory_of(tape.memory_slots, kChunkBytes));
+}
+
 void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes,
                   uint64_t* solid, Isa isa) {
     KILN_CHOOSE(isa, store_halves)(values.data(), values.size(), scale, limit, least, codes, solid);

@@ -90,6 +90,19 @@ void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, cons
 float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out,
                      Isa isa = best_isa());
 
+/// What an edit's values are compared with, texel by texel: see keeps_away().
+struct Away {
+    const uint16_t* halves;  ///< the texels of a brick, as store_halves() writes them
+    float scale;             ///< values are times this
+    float sign;              ///< 1 or -1: stored ones likewise
+    float margin;            ///< how far above a stored one a value must be
+    float floor;             ///< stored ones up to here ask for nothing
+};
+/// Whether at each of the 512 points of evaluate_brick() the value that `tape` leaves in R1, an edit's without its Combine, is above the
+/// stored one by more than the margin.
+bool keeps_away(const TapeView& tape, const float* x, const float* y, const float* z, const Away& from,
+                Isa isa = best_isa());
+
 /// Half-float bits of values * scale: clamped to +-limit, which NaN becomes too, and never below `least` unless exactly 0 (which loses its
 /// sign). Bit i of `solid`: value i is 0 or less. `count` is a multiple of 64; limit and least are normal halves.
 void store_halves(std::span<const float> values, float scale, float limit, float least, uint16_t* codes,

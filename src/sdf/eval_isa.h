@@ -22,6 +22,8 @@
                    const Balls& balls, uint64_t* left, uint64_t* right, float* value, void* memory);                   \
     float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples,                \
                          const float* x, const float* y, const float* z, float* out, void* memory);                    \
+    bool keeps_away(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x,     \
+                    const float* y, const float* z, const Away& from, void* memory);                                   \
     void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes,       \
                       uint64_t* solid);                                                                                \
     void run_formula_points(const FormulaOp* code, size_t count, void* registers, uint32_t result, float* out);        \

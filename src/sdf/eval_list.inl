@@ -82,6 +82,7 @@ void fold_list(const FoldEntry* entries, size_t count, const float* params, cons
 
 static constexpr int kSliceVectors = KILN_VECTORS;  // of a slice of 8 x 8 texels
 static constexpr int kBrickSlices = 8;
+static constexpr int kBrickLanes = kChunkPoints / KILN_VECTORS;
 
 struct BrickPoints {
     real x[kSliceVectors], y[kSliceVectors];
@@ -172,22 +173,31 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
     }
 }
 
+static void place_brick(BrickPoints& points, const float* x, const float* y, const float* z) {
+    alignas(64) float row_x[kChunkPoints], row_y[kChunkPoints];
+    for (int j = 0; j < 8; ++j) {
+        __builtin_memcpy(row_x + 8 * j, x, 8 * sizeof(float));
+        for (int i = 0; i < 8; ++i) row_y[8 * j + i] = y[j];
+    }
+    for (int i = 0; i < kSliceVectors; ++i) {
+        points.x[i] = load(row_x + i * kBrickLanes);
+        points.y[i] = load(row_y + i * kBrickLanes);
+    }
+    for (int slice = 0; slice < kBrickSlices; ++slice) points.z[slice] = param(z[slice]);
+}
+static void place_slice(Registers& r, const BrickPoints& points, int slice) {
+    for (int i = 0; i < kSliceVectors; ++i) {
+        r.cell[0].v[i] = points.x[i];
+        r.cell[1].v[i] = points.y[i];
+        r.cell[2].v[i] = real(points.z[slice]);
+    }
+}
+
 // Texel (i, j, k) is at (x[i], y[j], z[k]); out[(k * 8 + j) * 8 + i]. Returns the smallest |value|.
 float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
                      const float* z, float* out, void* memory) {
-    alignas(64) float row_x[kChunkPoints], row_y[kChunkPoints];
-    for (int i = 0; i < kChunkPoints; ++i) {
-        row_x[i] = x[i & 7];
-        row_y[i] = y[i >> 3];
-    }
     BrickPoints points;
-    constexpr int kLanes = kChunkPoints / KILN_VECTORS;
-    for (int i = 0; i < kSliceVectors; ++i) {
-        points.x[i] = load(row_x + i * kLanes);
-        points.y[i] = load(row_y + i * kLanes);
-    }
-    for (int slice = 0; slice < kBrickSlices; ++slice) points.z[slice] = param(z[slice]);
-
+    place_brick(points, x, y, z);
     BrickValues values;
     size_t pc = 0;
     if (count > 0 && Opcode(code[0] & 31u) == Opcode::Empty && ((code[0] >> 13) & 31u) == 0u) {
@@ -213,12 +223,8 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
             if (Opcode(word & 31u) > Opcode::PointClamp && ((word >> 13) & 31u) == 0u) break;
         }
         for (int slice = 0; slice < kBrickSlices; ++slice) {
-            for (int i = 0; i < kSliceVectors; ++i) {
-                r.cell[0].v[i] = points.x[i];
-                r.cell[1].v[i] = points.y[i];
-                r.cell[2].v[i] = real(points.z[slice]);
-                r.value[0].v[i] = values.v[slice][i];
-            }
+            place_slice(r, points, slice);
+            for (int i = 0; i < kSliceVectors; ++i) r.value[0].v[i] = values.v[slice][i];
             run_distance(r, code + 2 * pc, end - pc, params, Samples{samples});
             for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = r.value[0].v[i];
         }
@@ -230,13 +236,13 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
     for (int slice = 0; slice < kBrickSlices; ++slice) {
         for (int i = 0; i < kSliceVectors; ++i) {
             nearest[i & 3] = min(nearest[i & 3], abs(values.v[slice][i]));
-            store(out + (slice * kSliceVectors + i) * kLanes, values.v[slice][i]);
+            store(out + (slice * kSliceVectors + i) * kBrickLanes, values.v[slice][i]);
         }
     }
-    float lanes[kLanes];
+    float lanes[kBrickLanes];
     store(lanes, min(min(nearest[0], nearest[1]), min(nearest[2], nearest[3])));
     float least = lanes[0];
-    for (int i = 1; i < kLanes; ++i) least = lanes[i] < least ? lanes[i] : least;
+    for (int i = 1; i < kBrickLanes; ++i) least = lanes[i] < least ? lanes[i] : least;
     return least;
 }
 
@@ -249,16 +255,21 @@ static inline void store_words(uint16_t* to, lane_u words) {
     __builtin_memcpy(to, &narrow, sizeof narrow);
 }
 static inline lane_u all_words(uint32_t w) { return lane_u{} + w; }
+static inline lane_u load_words(const uint16_t* from) {
+    lane_h narrow;
+    __builtin_memcpy(&narrow, from, sizeof narrow);
+    return __builtin_convertvector(narrow, lane_u);
+}
 #else
 static inline uint32_t word_bits(real v) { return __builtin_bit_cast(uint32_t, v); }
 static inline uint32_t choose(mask m, uint32_t a, uint32_t b) { return m ? a : b; }
 static inline void store_words(uint16_t* to, uint32_t word) { *to = uint16_t(word); }
 static inline uint32_t all_words(uint32_t w) { return w; }
+static inline uint32_t load_words(const uint16_t* from) { return *from; }
 #endif
 
 // See store_halves() in sdf/eval.h. Integer arithmetic, to nearest, ties to even.
 void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes, uint64_t* solid) {
-    constexpr size_t kLanes = kChunkPoints / KILN_VECTORS;
     const real zero = real(param(0));
     const auto rounded = [](real size) {
         const auto bits = word_bits(size) - 0x38000000u;  // exponent bias 127 -> 15
@@ -267,7 +278,7 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
     const auto at_limit = rounded(real(param(limit))), at_least = rounded(real(param(least)));
     for (size_t slice = 0; slice < count / 64; ++slice) {
         uint64_t bits = 0;  // kept apart from memory: each vector's are joined to those before
-        for (size_t at = 0; at < 64; at += kLanes) {
+        for (size_t at = 0; at < 64; at += size_t(kBrickLanes)) {
             const size_t i = 64 * slice + at;
             const real v = load(values + i) * param(scale);
             bits |= uint64_t(lane_bits(le(v, zero))) << at;
@@ -279,4 +290,58 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
         }
         solid[slice] = bits;
     }
+}
+
+// Values of store_halves()'s bits, but for 0, which is 2^-15.
+static inline real half_values(const uint16_t* codes) {
+    const auto code = load_words(codes);
+    return real_of_bits(whole((((code & 0x7fffu) << 13) + 0x38000000u) | ((code & 0x8000u) << 16)));
+}
+
+// Which of some texels are too near.
+static inline mask too_near(const Away& from, real value, int texel) {
+    const real stored = half_values(from.halves + texel) * param(from.sign);
+    return both(no(gt(value * param(from.scale), stored + param(from.margin))), gt(stored, real(param(from.floor))));
+}
+
+template <uint32_t kShape>
+static __attribute__((noinline)) bool leaf_keeps_away(const BrickPoints& points, const float* t, const float* w, const Away& from) {
+    const param tx = param(t[0]), ty = param(t[1]), tz = param(t[2]), scale = param(w[0]);
+    for (int i = 0; i < kSliceVectors; ++i) {
+        const real x = points.x[i] - tx, y = points.y[i] - ty;
+        mask near = gt(real(param(0)), real(param(0)));
+        for (int slice = 0; slice < kBrickSlices; ++slice) {
+            const real d = shape_distance(kShape, real3(x, y, real(points.z[slice] - tz)), w + 3, Samples{nullptr}) * scale;
+            near = either(near, too_near(from, d, slice * kChunkPoints + i * kBrickLanes));
+        }
+        if (lane_bits(near) != 0) return false;
+    }
+    return true;
+}
+
+// See sdf/eval.h.
+bool keeps_away(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
+                const float* z, const Away& from, void* memory) {
+    static const float kOrigin[3] = {0, 0, 0};
+    BrickPoints points;
+    place_brick(points, x, y, z);
+    const Opcode point = Opcode(code[0] & 31u);
+    if (count == 2 && (point == Opcode::PointTranslate || point == Opcode::PointCell) && Opcode(code[2] & 31u) == Opcode::Shape) {
+        const float* const t = point == Opcode::PointTranslate ? params + code[1] : kOrigin;
+        switch ((code[2] >> 5) & 255u) {
+            case kFusedSphere: return leaf_keeps_away<kFusedSphere>(points, t, params + code[3], from);
+            case kFusedBox: return leaf_keeps_away<kFusedBox>(points, t, params + code[3], from);
+            default: break;
+        }
+    }
+    Registers r;
+    r.memory = static_cast<Chunk*>(memory);
+    for (int slice = 0; slice < kBrickSlices; ++slice) {
+        place_slice(r, points, slice);
+        run_distance(r, code, count, params, Samples{samples});
+        for (int i = 0; i < kSliceVectors; ++i) {
+            if (lane_bits(too_near(from, r.value[1].v[i], slice * kChunkPoints + i * kBrickLanes)) != 0) return false;
+        }
+    }
+    return true;
 }

@@ -30,7 +30,7 @@ TEST(Shared, WritesInPlaceWhenAloneAndToACopyWhenNot) {
     EXPECT_EQ(b.get(), where);
     EXPECT_FALSE(a == b);
     Shared<std::vector<int>> c = b;
-    EXPECT_TRUE(c.renew().empty());
+    EXPECT_TRUE(c.renew().empty());  // a vector has an initialiser of its own
     EXPECT_EQ(b->size(), 3u);
     Shared<int> none;
     EXPECT_FALSE(none);
@@ -115,6 +115,31 @@ TEST(PagedArray, ChangesOnePageAndSharesTheRest) {
     a.resize_pages(300);
     EXPECT_EQ(a[2399], -1);
     EXPECT_EQ(then.size(), 1600u);
+    const PagedArray<int, 8> later = a;
+    for (const size_t i : {0u, 26u, 1000u, 2047u, 2048u, 2399u}) a.write(i) = 8;
+    std::vector<size_t> pages;
+    a.each_other_page(later, [&](size_t page) { pages.push_back(page); });
+    EXPECT_EQ(pages, (std::vector<size_t>{0, 3, 125, 255, 256, 299}));
+    EXPECT_EQ(later[2399], -1);
+}
+
+TEST(PagedArray, PagesThatHoldSharedsKeepTheirCount) {
+    struct Held {
+        Shared<int> value;
+        void prefetch() const { value.prefetch(); }
+    };
+    const auto one = Shared<int>::make(7);
+    PagedArray<Held, 4> a;
+    a.resize_pages(20);
+    for (size_t i = 0; i < 80; i += 3) a.write(i).value = one;
+    PagedArray<Held, 4> b = a;
+    a.write(0).value.write() = 8;
+    b.write(3).value = {};
+    EXPECT_EQ(*b[0].value, 7);
+    EXPECT_EQ(*a[0].value, 8);
+    EXPECT_EQ(a[3].value, one);
+    EXPECT_FALSE(b[3].value);
+    EXPECT_FALSE(b[1].value);
 }
 
 }  // namespace

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#include "field/still_texels.h"
+
+#include <bit>
+#include <limits>
+
+namespace kiln::field {
+namespace {
+
+constexpr float kInfinite = std::numeric_limits<float>::infinity();
+// Halves are off by up to 2^-10 voxel, arithmetic by far less.
+constexpr float kRounding = 0x1p-8f;
+
+// Values differ across half a cell by more than this more often than not.
+constexpr float kGuardVoxels = 2;
+
+}  // namespace
+
+StillTexels::StillTexels(const sdf::Program& program, float voxel_size, std::vector<Change> changes)
+    : program_(&program), voxel_size_(voxel_size), changes_(std::move(changes)) {
+    for (const Change& change : changes_) {
+        const sdf::EditSpan& edit = program.edits[change.row];
+        const std::span<const sdf::Instruction> code = program.code.subspan(edit.first, edit.count - 1);
+        code_first_.push_back(code_.size());
+        code_.insert(code_.end(), code.begin(), code.end());
+        code_.push_back(sdf::Instruction::make(sdf::Opcode::Move, 0, 0, 1, 0, 0));
+    }
+    code_first_.push_back(code_.size());
+}
+
+uint64_t StillTexels::likely(const sdf::Balls& centres, const float* values) const {
+    uint64_t out = ~uint64_t(0);
+    alignas(64) float edit[64];
+    const float voxels = 1 / voxel_size_;
+    for (size_t i = 0; i < changes_.size(); ++i) {
+        if (margins_[i] == kInfinite) return 0;
+        const std::span<const sdf::Instruction> code =
+            std::span(code_).subspan(code_first_[i], code_first_[i + 1] - code_first_[i]);
+        sdf::evaluate(sdf::view(*program_, code), {centres.x, centres.y, centres.z, 64}, edit);
+        const float sign = program_->edits[changes_[i].row].op == Op::Union ? 1.0f : -1.0f;
+        const float floor = changes_[i].gone ? -kInfinite : -kBandVoxels, above = margins_[i] + kGuardVoxels;
+        uint64_t away = 0;
+        for (uint64_t left = centres.live; left != 0; left &= left - 1) {
+            const int ball = std::countr_zero(left);
+            const float world = sign * values[ball] * voxels;
+            away |= edit[ball] * voxels > world + above || world < floor ? left & -left : 0;
+        }
+        out &= away;
+    }
+    return out;
+}
+
+void StillTexels::see(std::span<const uint32_t> rows) {
+    margins_.clear();
+    for (const Change& change : changes_) {
+        const sdf::EditSpan& edit = program_->edits[change.row];
+        sdf::BlendAllowance later;
+        // What is gone has no place in the list, which may have new numbers since: it may be before any other, and after.
+        for (const uint32_t row : rows) {
+            if (change.gone || program_->edits[row].order > edit.order) later.add(program_->edits[row].reach);
+        }
+        for (const Change& other : changes_) {
+            if (other.gone && other.row != change.row) later.add(program_->edits[other.row].reach);
+        }
+        const bool moves_one_way = edit.op == Op::Union || edit.op == Op::Subtract;
+        margins_.push_back(moves_one_way ? (edit.reach + later.metres()) / voxel_size_ + kRounding : kInfinite);
+    }
+}
+
+bool StillTexels::hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, std::optional<uint16_t> only,
+                       BrickEvaluator& evaluator) const {
+    if (!brick.half || brick.materials || only != brick.material) return false;
+    for (size_t i = 0; i < changes_.size(); ++i) {
+        const Change& change = changes_[i];
+        if (!contains(change.reached, cell)) continue;
+        if (margins_[i] == kInfinite) return false;
+        const sdf::EditSpan& edit = program_->edits[change.row];
+        const sdf::Away from{brick.half->codes.data(), 0, edit.op == Op::Union ? 1.0f : -1.0f, margins_[i],
+                             change.gone ? -kInfinite : -kBandVoxels};
+        if (!evaluator.keeps_away(program_->code.subspan(edit.first, edit.count - 1), first_texel, from)) return false;
+    }
+    return true;
+}
+
+}  // namespace kiln::field

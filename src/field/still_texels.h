@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MIT
+// Still texels: bricks whose code an update changes, but nothing that they hold. Culling sees a brick as a ball; here an edit that came or went
+// is held against the stored texels themselves, for the price of that one edit. Of the bricks that a bite culls into, two of three stay.
+//
+// Say that an edit's value, of reach k, is at a texel above w + k + S: w what is stored there, S the reaches of later edits. Then the world has
+// one value there with it and without it: the proof beside EditIndex::blend_allowance(), for T = w, has both worlds above T or equal, and one of
+// them is w. (Where w is cut off at the band, both are beyond it or equal.) For a cut all of this is upside down. And where a texel is at
+// the far end inside, no union that comes can change it: worlds grow with what they are made of, and so do their ends.
+#pragma once
+
+#include "field/brick_content.h"
+#include "field/cell_maker.h"
+
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace kiln::field {
+
+class StillTexels {
+public:
+    struct Change {
+        uint32_t row;
+        bool gone;
+        CellBox reached;  ///< cells in which it may change what is stored
+    };
+    StillTexels(const sdf::Program& program, float voxel_size, std::vector<Change> changes);
+
+    /// What is asked next is about cells that these rows reach, of the program as it is now.
+    void see(std::span<const uint32_t> rows);
+    /// Which of 64 cells to ask about, from the program's values at their centres: a guess that keeps the price of asking in vain low.
+    uint64_t likely(const sdf::Balls& centres, const float* values) const;
+    /// Whether the brick of a cell holds after all changes what it held before. `only`: the one material of all that the cell's new code has.
+    bool hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, std::optional<uint16_t> only,
+              BrickEvaluator& evaluator) const;
+
+private:
+    const sdf::Program* program_;
+    float voxel_size_;
+    std::vector<Change> changes_;
+    std::vector<sdf::Instruction> code_;  // of all changes: each edit's value moved to R0
+    std::vector<size_t> code_first_;
+    std::vector<float> margins_;  // of each change, voxels; infinite: not to be told this way
+};
+
+}  // namespace kiln::field
