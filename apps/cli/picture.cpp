@@ -223,6 +223,7 @@ std::string report(const PictureOptions& o, std::string_view quality, const Rend
         Json own;
         own.number("count", stats.instances).number("bricks", stats.instance_bricks);
         own.number("bricks_new", stats.instance_bricks_new).number("ms", stats.instances_ms);
+        own.number("tiles_by_tree", double(stats.instance_tiles_by_tree));
         json.raw("instances", own.object());
     }
     if (stats.triangles > 0)

@@ -247,6 +247,8 @@ struct RenderStats {
     int cascades = 0;                    ///< shadow maps
     int rays_across = 0, rays_down = 0;  ///< pixels that were marched and lit, before upscaling
     std::string lighting = "clusters";   ///< of point and spot lights: "clusters", "volumes"
+    uint64_t instance_tiles_by_tree =
+        0;  ///< of 8 x 8 pixels that met too many instances for a list, so that each ray walked their tree
 };
 
 struct DeviceInfo {

@@ -14,6 +14,35 @@ namespace {
 // Around the solid: a cell owns a brick up to a voxel away, and gradients look one further.
 constexpr float kMarginVoxels = 2;
 
+CellBox solid_voxels_of(const HostBricks& bricks) {
+    const Field& f = bricks.field();
+    const GridParams grid = f.grid();
+    CellBox out{};
+    const auto add = [&](ivec3 cell, ivec3 first, ivec3 last) {
+        const ivec3 texel{(grid.cell_x + cell.x) * kBrickVoxels, (grid.cell_y + cell.y) * kBrickVoxels,
+                          (grid.cell_z + cell.z) * kBrickVoxels};
+        const CellBox box{{texel.x + first.x, texel.y + first.y, texel.z + first.z},
+                          {texel.x + last.x + 1, texel.y + last.y + 1, texel.z + last.z + 1}};
+        out = out.empty() ? box : joined(out, box);
+    };
+    for (int z = 0; z < grid.size_z; ++z) {
+        for (int y = 0; y < grid.size_y; ++y) {
+            for (int x = 0; x < grid.size_x; ++x) {
+                const uint32_t word = f.cells().at(x, y, z);
+                if ((word & kCellOccupied) != 0) {
+                    const uint32_t box = bricks.content(word & kCellSlotMask).solid_box;
+                    const auto at = [&](int shift) { return int(box >> shift & 7u); };
+                    if (box < kNoSolidBox) add({x, y, z}, {at(0), at(3), at(6)}, {at(9), at(12), at(15)});
+                } else if ((word & kCellInside) != 0) {
+                    constexpr int last = kBrickVoxels - 1;
+                    add({x, y, z}, {0, 0, 0}, {last, last, last});
+                }
+            }
+        }
+    }
+    return out;
+}
+
 }  // namespace
 
 float BrickSet::voxel_size_for(const sdf::Program& object, float field_voxel) {
@@ -56,6 +85,7 @@ Result<std::shared_ptr<const BrickSet>> BrickSet::make(std::shared_ptr<const sdf
         }
         BrickSet out;
         out.bricks_ = std::move(*made);
+        out.solid_voxels_ = solid_voxels_of(out.bricks_);
         return std::make_shared<const BrickSet>(std::move(out));
     }
 }

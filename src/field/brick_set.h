@@ -5,6 +5,7 @@
 
 #include "base/hash.h"
 #include "field/host_bricks.h"
+#include "field/jumps.h"
 
 #include <memory>
 
@@ -32,10 +33,14 @@ public:
     float voxel_size() const { return field().options().voxel_size; }
     /// Holds all that is solid, and the bricks around it.
     const Box3& box() const { return field().options().bounds; }
+    /// All voxels that hold some of the surface or lie within, from the object's origin; empty where nothing is solid. Rays meet the
+    /// object nowhere else.
+    const CellBox& solid_voxels() const { return solid_voxels_; }
 
 private:
     BrickSet() = default;
     HostBricks bricks_;
+    CellBox solid_voxels_{};
 };
 
 }  // namespace kiln::field

@@ -2,8 +2,8 @@
 // Work is done in blocks of 16³ cells (cell_maker.h), several at a time; what they made is put in place by the owner's thread, in order, so
 // that with a budget in bricks alone nothing depends on the number of workers.
 //
-// Order of work: where something that is drawn of the last level is missing, a level of the net (clipmap_net.cpp), or without a
-// budget the last level itself, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are missing
+// Order of work: where something that is drawn of the last level is missing, a level of the net (clipmap_net.cpp), its
+// coarsest where there is a budget in time, or without a budget the last level itself, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are missing
 // too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser level under it,
 // and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window just moved, so in a
 // steady flight the last level's shells are made, within the budget, before they are seen.
@@ -619,12 +619,17 @@ bool Clipmap::work(const BakeBudget& budget) {
     const int last = options_.levels - 1;
     const bool limited = run.timed || run.bricks != kUnlimited;
     const int at_once = limited ? last + net_depth(options_.cells, all_levels() - options_.levels, run.bricks) : last;
-    net_ = net_ || (at_once > last && needs_net());
-    if (at_once == last)
+    // How long bricks take is not known beforehand: where time counts, only the least is made at once.
+    const int coarsest = all_levels() - 1;
+    const bool hurries = run.timed && coarsest > last;
+    net_ = net_ || ((hurries || at_once > last) && needs_net());
+    const int first = hurries ? coarsest : at_once;
+    if (first == last)
         fill(last, all, drawn(last));
     else if (net_)
-        fill_net(at_once, all);
-    run.spend(levels_[size_t(at_once)].counts.baked);
+        fill_net(first, all);
+    run.spend(levels_[size_t(first)].counts.baked);
+    if (net_ && last < at_once && at_once < first) fill_net(at_once, run);
     std::vector<int> changes;
     bool missing = false;
     for (int level = 0; level < all_levels(); ++level) {

@@ -37,7 +37,7 @@ struct ClipmapOptions {
 inline constexpr uint32_t kNetBricks = 5 * 5 * 5;
 
 /// What one work() may cost. Whatever is said here, a level of the net is made at once where the picture has nothing else, or it would have a
-/// hole: no more than the bricks said here or kNetBricks, which count. (Of 64 cells more than 12 levels leave the net fewer than it wants: then more.)
+/// hole: no more than the bricks said here or kNetBricks, which count; where seconds are said, its coarsest level and no other. (Of 64 cells more than 12 levels leave the net fewer than it wants: then more.)
 struct BakeBudget {
     uint32_t bricks = std::numeric_limits<uint32_t>::max();
     double seconds = std::numeric_limits<double>::infinity();  ///< asked between bricks: the last one ends late

@@ -32,6 +32,8 @@ Result<void> FrameWork::load(std::string_view scene) {
     return {};
 }
 
+void FrameWork::show(const Frame& frame) { impl_->frame = frame; }
+
 Result<uint64_t> FrameWork::draw(int width, int height) {
     const auto picture = impl_->renderer.render(impl_->frame, {.width = width, .height = height});
     if (!picture) return picture.error();

@@ -13,6 +13,8 @@
 
 namespace kiln {
 
+struct Frame;
+
 class FrameWork {
 public:
     /// Fails where nothing can draw.
@@ -21,7 +23,8 @@ public:
     ~FrameWork();
 
     Result<void> load(std::string_view scene);
-    /// One picture: the hash of its bytes. Costs are in `passes`, with "all" last.
+    void show(const Frame& frame);
+    /// One picture of what was loaded or shown: the hash of its bytes. Costs are in `passes`, with "all" last.
     Result<uint64_t> draw(int width, int height);
     std::vector<std::pair<std::string, double>> passes() const;  ///< ms
 

@@ -18,7 +18,20 @@ namespace {
 // Bricks that sets which are not shown may keep.
 constexpr uint64_t kRoomForOld = 1024;
 
+// Around a box of voxels, for the rounding of rays: as of cells.
+using field::kBoxMargin;
+
 uint32_t slots_of(const field::BrickSet& set) { return std::max(set.field().slot_count(), 1u); }
+
+// Metres from the object's origin.
+Box3 solid_box_of(const field::BrickSet& set) {
+    const field::CellBox& v = set.solid_voxels();
+    const float h = set.voxel_size();
+    const vec3 low{float(v.min.x), float(v.min.y), float(v.min.z)},
+        high{float(v.max.x), float(v.max.y), float(v.max.z)};
+    return {(low - vec3{kBoxMargin, kBoxMargin, kBoxMargin}) * h,
+            (high + vec3{kBoxMargin, kBoxMargin, kBoxMargin}) * h};
+}
 
 // Rotations in double precision: places count from the eye, which may be kilometres away.
 struct Rotation {
@@ -161,6 +174,13 @@ Result<void> GpuInstances::write_tables() {
         const sdf::Program& program = bricks->program();
         InstanceSet set{};
         set.grid = f.grid();
+        const field::CellBox& solid = bricks->solid_voxels();
+        set.low_x = float(solid.min.x) - kBoxMargin;
+        set.low_y = float(solid.min.y) - kBoxMargin;
+        set.low_z = float(solid.min.z) - kBoxMargin;
+        set.high_x = float(solid.max.x) + kBoxMargin;
+        set.high_y = float(solid.max.y) + kBoxMargin;
+        set.high_z = float(solid.max.z) + kBoxMargin;
         set.slot_first = end - uint32_t(*sets_.at(bricks.get()).place) - slots_of(*bricks);
         set.cells_first = uint32_t(cells.size());
         set.records_first = uint32_t(records.size());
@@ -208,7 +228,7 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
         vec4* const rows[] = {&r.x, &r.y, &r.z};
         vec4* const before_rows[] = {&r.before_x, &r.before_y, &r.before_z};
         int* const eye_voxel[] = {&r.eye_x, &r.eye_y, &r.eye_z};
-        const Box3& box = instance.bricks->box();
+        const Box3 box = instance.glass == 0 ? solid_box_of(*instance.bricks) : instance.bricks->box();
         const vec3 middle = box.center(), half = box.half_extents();
         float low[3], high[3];
         for (size_t k = 0; k < 3; ++k) {
@@ -236,7 +256,7 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
         }
         if (instance.glass != 0 && instance.glass < materials.size())
             glass_[i] = glass_record(materials[instance.glass]);
-        if (instance.bricks->field().stats().bricks > 0)
+        if (!instance.bricks->solid_voxels().empty())
             (instance.glass == 0 ? boxes : glass_boxes)[i] = {{low[0], low[1], low[2]}, {high[0], high[1], high[2]}};
     }
     nodes_ = instance_tree(boxes);

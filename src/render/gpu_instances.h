@@ -28,6 +28,8 @@ struct InstanceHandles {
     Buffer glass_nodes,
         glass;  // GlassRecord of every instance; the tree of those that light goes through, and those records again
     uint32_t glass_node_count = 0;
+    uint32_t by_tree =
+        0;  // 1: rays of the march walk the tree, as those do whose list is too long (the slow twin of the lists)
     explicit operator bool() const { return node_count != 0; }
     bool any() const { return node_count + glass_node_count != 0; }
     // Those that light goes through, for the passes that find and draw instances.

@@ -472,7 +472,10 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
             auto words = counted.get_as<uint32_t>();
             if (!words) return words.error();
             uint64_t sum = 0;
-            for (const uint32_t n : *words) sum += n;
+            for (const uint32_t n : *words) {
+                sum += n & ~kWalkedTree;
+                stats.instance_tiles_by_tree += n >> 31;
+            }
             stats.evaluations += sum;
             const std::string pass = counted.name().substr(0, counted.name().find(" evaluations"));
             const auto same = std::find_if(stats.pass_evaluations.begin(), stats.pass_evaluations.end(),

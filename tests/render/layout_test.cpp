@@ -112,8 +112,9 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
         AT(LightRecord, position),   AT(LightRecord, direction),   AT(LightRecord, color), AT(LightRecord, kind),
         AT(LightRecord, spot_scale), AT(LightRecord, spot_offset), AT(LightRecord, pad_0)};
     std::vector<uint32_t> set;
-    for (uint32_t i = 0; i < 16; ++i) set.push_back(i * 4);
+    for (uint32_t i = 0; i < 22; ++i) set.push_back(i * 4);
     EXPECT_EQ(AT(InstanceSet, samples_first), 52u);
+    EXPECT_EQ(AT(InstanceSet, high_z), 76u);
     expect_array(kMarchInstances, 9, set, sizeof(InstanceSet));
     std::vector<uint32_t> instance;
     for (uint32_t i = 0; i < 6; ++i) instance.push_back(i * 16);

@@ -225,6 +225,29 @@ TEST(LevelPicturesGpu, NothingPopsOnADolly) {
     EXPECT_LE(worst, 0.02f) << "of any pixel";
 }
 
+// Two renderers, two clipmaps, the same flight: the same bits, whatever is still missing.
+TEST(LevelPicturesGpu, TwoRunsOfAFlightAreTheSameBits) {
+    const auto program = field::worlds::compiled(hills());
+    std::vector<std::vector<uint8_t>> first;
+    for (const int run : {0, 1}) {
+        auto renderer = renderer_or_skip();
+        if (!renderer) GTEST_SKIP();
+        Clipmap map = made(program, {0, 0.9, 3}, 0.02f, 4);
+        map.work({.bricks = 2000});
+        for (int frame = 0; frame < 5; ++frame) {
+            const vec3 eye{0.3f * float(frame), 0.9f, 3 - 0.4f * float(frame)};
+            map.move({double(eye.x), double(eye.y), double(eye.z)});
+            map.work({.bricks = 400});
+            auto picture = renderer->render(seen_from(map, eye, {0.4f, 0.2f, -1}), {.width = 64, .height = 36});
+            ASSERT_TRUE(picture) << picture.error().message;
+            if (run == 0)
+                first.push_back(picture->srgb);
+            else
+                EXPECT_EQ(picture->srgb, first[size_t(frame)]) << "frame " << frame;
+        }
+    }
+}
+
 // The view `levels` tells where a pool too small shows a coarser level.
 TEST(LevelPicturesGpu, WhatAPoolGaveBackIsSeenInTheViewOfLevels) {
     auto renderer = renderer_or_skip();

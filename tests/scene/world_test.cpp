@@ -421,18 +421,31 @@ TEST(World, NearestWord) {
 }
 
 // KILN_MILLION=1 for the full size; a fifth of it takes seconds.
-TEST(WorldSlow, HundredsOfThousandsOfEditsLoad) {
+TEST(WorldSlow, HundredsOfThousandsOfEditsLoadAndAreEdited) {
     const int count = std::getenv("KILN_MILLION") ? 1000000 : 200000;
     std::string edits;
     for (int i = 0; i < count; ++i)
         edits += (i ? "," : "") + std::string("{\"shape\":\"sphere\",\"radius\":0.3,\"position\":[") +
                  std::to_string(i % 100) + "," + std::to_string(i / 100 % 100) + "," + std::to_string(i / 10000) + "]}";
-    const auto world = World::parse(scene_with(edits), "s.json");
+    auto world = World::parse(scene_with(edits), "s.json");
     ASSERT_TRUE(world) << world.error().message;
     EXPECT_EQ(world->edits().size(), size_t(count));
     EXPECT_NEAR(world->distance({0, 1, -1}), 0.7f, 1e-5f);
     const auto frame = world->frame();
     ASSERT_TRUE(frame) << frame.error().message;
+    // And is edited like a small one: a change, what it shows, and back.
+    History history = world->history();
+    const EditId last = world->edits().back();
+    Edit larger = *world->find(last);
+    larger.node.shape = Sphere{.radius = 0.45f};
+    const vec3 at = larger.node.transform.position;
+    ASSERT_TRUE(world->change(last, larger));
+    EXPECT_NEAR(world->distance(at + vec3{0, 1, 0}), 0.55f, 1e-3f);
+    const auto changed = world->frame();
+    ASSERT_TRUE(changed);
+    EXPECT_LT(changed->field->stats().bricks_baked, 1000u);
+    ASSERT_TRUE(*history.undo());
+    EXPECT_NEAR(world->distance(at + vec3{0, 1, 0}), 0.7f, 1e-3f);
 }
 
 TEST(World, AViewStaysWhatItWasWhileTheWorldChanges) {

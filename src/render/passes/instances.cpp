@@ -39,7 +39,7 @@ void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, c
                {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
                 g.read(in.rays), g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances),
                 g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both), g.read(light_masks)},
-               InstancePush{.node_count = i.node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0});
+               InstancePush{.node_count = i.node_count, .first_light = first_light, .by_tree = 0, .pad_0 = 0});
     fractions = both;
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Bricks of instances in kernels: their field for field/march.gpu.h and field/surface.gpu.h, and the walk of a ray through the tree. The including
 // kernel declares first what atlas.glsl and rays.glsl ask for, and
-//   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: InstanceNode nodes[];
+//   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: InstanceNode nodes[], InstancePush push;
 //   for KILN_FIELD_SURFACE also utexture3D materials.
 
 #include "field/brick_walk.gpu.h"
@@ -74,5 +74,48 @@ float walk_enters(InstanceNode n, vec3 from, vec3 inverse, float t_end) {
     return t_in <= t_out ? t_in : kFarVoxels;
 }
 
+// Cuts the range of t to where the ray, in the object's voxels, comes as near as `by` to what is solid of the set at hand; t_in > t_out where it
+// never does.
+void set_span(TexelRay ray, float by, inout float t_in, inout float t_out) {
+    vec3 from = vec3(ray.whole) + ray.part;
+    vec3 a = (vec3(here.low_x, here.low_y, here.low_z) - by - from) * ray.inverse;
+    vec3 b = (vec3(here.high_x, here.high_y, here.high_z) + by - from) * ray.inverse;
+    bvec3 parallel = equal(ray.inverse, vec3(0.0));
+    vec3 low = mix(min(a, b), vec3(-kFarVoxels), parallel);
+    vec3 high = mix(max(a, b), vec3(kFarVoxels), parallel);
+    t_in = max(t_in, max(max(low.x, low.y), low.z) * (1.0 - 1e-5));
+    t_out = min(t_out, min(min(high.x, high.y), high.z) * (1.0 + 1e-5));
+}
+
 bool walk_meets(InstanceNode n, vec3 from, vec3 inverse, float t_end) { return walk_enters(n, from, inverse, t_end) < kFarVoxels; }
+
+// Where the ray, or the cone around it, enters the node's box, if that is up to t_end; kFarVoxels where it does not.
+float node_enters(InstanceNode node, vec3 from, vec3 direction, vec3 inverse, float tan_radius, float t_end) {
+    if (tan_radius > 0.0) {
+        vec3 low = vec3(node.low_x, node.low_y, node.low_z);
+        vec3 high = vec3(node.high_x, node.high_y, node.high_z);
+        float farthest = dot(0.5 * (low + high) - from, direction) + 0.5 * length(high - low);
+        float by = max(farthest, 0.0) * tan_radius;
+        node.low_x -= by;
+        node.low_y -= by;
+        node.low_z -= by;
+        node.high_x += by;
+        node.high_y += by;
+        node.high_z += by;
+    }
+    return walk_enters(node, from, inverse, t_end);
+}
+
+// The next leaf of the tree whose box the ray (the cone) enters up to t_end, and where; kNoInstance: none is left. `at` counts nodes.
+uint next_in_tree(inout uint at, vec3 from, vec3 direction, vec3 inverse, float tan_radius, float t_end, inout InstanceNode leaf, inout float enters,
+                  inout int looks) {
+    while (at < push.node_count) {
+        leaf = nodes[at];
+        looks++;
+        enters = node_enters(leaf, from, direction, inverse, tan_radius, t_end);
+        at = enters < kFarVoxels ? at + 1u : leaf.skip;
+        if (enters < kFarVoxels && leaf.instance != kNoInstance) return leaf.instance;
+    }
+    return kNoInstance;
+}
 #endif

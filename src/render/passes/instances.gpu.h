@@ -13,11 +13,12 @@ using field::GridParams;
 using uint = uint32_t;
 #endif
 
-// Bricks of one object (64 bytes). Cell words and records count slots from the set's own first.
+// Bricks of one object (88 bytes). Cell words and records count slots from the set's own first.
 struct InstanceSet {
     GridParams grid;  // in voxels of the object; atlas_bricks_x_y is not used
     uint slot_first;  // in the atlas
     uint cells_first, records_first, code_first, params_first, samples_first;  // in the buffers of all sets
+    float low_x, low_y, low_z, high_x, high_y, high_z;  // voxels from the object's origin: rays meet it nowhere else
     uint pad_0, pad_1;
 };
 
@@ -46,14 +47,17 @@ KILN_CONST uint kNoInstance = 0xffffffffu;
 struct InstancePush {
     uint node_count;
     uint first_light;  // of the shadow pass
-    uint pad_0, pad_1;
+    uint by_tree;      // of the march: 1: no lists, each ray walks the tree
+    uint pad_0;
 };
+// Of what a workgroup of the march counted: its rays walked the tree.
+KILN_CONST uint kWalkedTree = 0x80000000u;
 
 // Of z of the visibility word.
 KILN_CONST uint kInstanceSlotShift = 9u;
 
 #ifdef __cplusplus
-static_assert(sizeof(InstanceSet) == 64 && sizeof(InstanceRecord) == 128 && sizeof(InstanceNode) == 32 &&
+static_assert(sizeof(InstanceSet) == 88 && sizeof(InstanceRecord) == 128 && sizeof(InstanceNode) == 32 &&
               sizeof(InstancePush) == 16);
 }  // namespace kiln::render
 #endif

@@ -46,7 +46,7 @@ Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth) {
             const InstanceHandles& i = in.instances;
             uses.insert(uses.end(), {g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells)});
             g.dispatch(march_kernel(in), in.size, uses,
-                       InstancePush{.node_count = i.node_count, .first_light = 0, .pad_0 = 0, .pad_1 = 0});
+                       InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = i.by_tree, .pad_0 = 0});
         } else {
             g.dispatch(march_kernel(in), in.size, uses);
         }

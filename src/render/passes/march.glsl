@@ -62,14 +62,21 @@ void main() {
     if (gl_LocalInvocationIndex == 0u) group_evaluations = 0u;
     barrier();
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    if (pixel.x < frame.tile_width && pixel.y < frame.tile_height) {
+    bool has_ray = pixel.x < frame.tile_width && pixel.y < frame.tile_height;
+#ifdef KILN_INSTANCES
+    TexelRay ray = pixel_ray(min(pixel, ivec2(frame.tile_width, frame.tile_height) - 1));
+    vec3 from = from_eye(ray);
+    make_list(has_ray, from, ray.direction, (frame.flags & kFrameRays) == 0u);
+#endif
+    if (has_ray) {
+#ifndef KILN_INSTANCES
         TexelRay ray = pixel_ray(pixel);
+#endif
         bool accelerate = (frame.flags & kFrameAccelerate) != 0u;
         float t_last = ray_end(pixel, ray.direction);
 #ifdef KILN_INSTANCES
         // The world up to the first box of an instance; the instances; the world behind that box, up to what was found there. So neither
         // looks at voxels that the other hides.
-        vec3 from = from_eye(ray);
         vec3 inverse = walk_inverse(ray.direction);
         int boxes = 0;
         float first_box = first_box_of(from, inverse, boxes);
@@ -123,6 +130,10 @@ void main() {
     }
     barrier();
     if (gl_LocalInvocationIndex == 0u) {
-        evaluations[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] = group_evaluations;
+        uint counted = group_evaluations;
+#ifdef KILN_INSTANCES
+        if (list_count > kMostListed) counted |= kWalkedTree;
+#endif
+        evaluations[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x] = counted;
     }
 }

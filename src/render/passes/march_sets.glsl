@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// A primary ray among instances: down their tree, into each object's own voxels, and through its bricks by the march of the world's. The
-// including kernel declares first what instances.glsl asks for with KILN_INSTANCE_WALK, and InstancePush push.
+// A primary ray among instances: along the list of its workgroup or down the tree, into each object's own voxels, and through its bricks by the march
+// of the world's. The including kernel declares first what instances.glsl asks for with KILN_INSTANCE_WALK, and InstancePush push.
 
 // The bricks of sets, under names of their own beside the world's.
 #define field_cell set_cell
@@ -38,6 +38,8 @@
 #undef march_cell
 #undef field_march
 
+#include "render/passes/instance_list.glsl"
+
 struct SetHit {
     float t;        // finest voxels; kFarVoxels: none
     uint instance;  // kNoInstance: none
@@ -50,15 +52,9 @@ MarchHit no_hit() { return MarchHit(kMarchMiss, kFarVoxels, -1, ivec3(0), ivec3(
 // Where a ray enters the first box of a leaf, kFarVoxels where it meets none. `looks` counts boxes.
 float first_box_of(vec3 from, vec3 inverse, inout int looks) {
     float first = kFarVoxels;
+    float enters = kFarVoxels;
     uint at = 0u;
-    while (at < push.node_count) {
-        InstanceNode node = nodes[at];
-        looks++;
-        float enters = walk_enters(node, from, inverse, first);
-        bool meets = enters < first;
-        at = meets ? at + 1u : node.skip;
-        if (meets && node.instance != kNoInstance) first = enters;
-    }
+    while (next_leaf(at, from, inverse, first, enters, looks) != kNoInstance) first = enters;
     return first;
 }
 
@@ -66,23 +62,22 @@ float first_box_of(vec3 from, vec3 inverse, inout int looks) {
 SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, float t_last, bool accelerate) {
     SetHit nearest = SetHit(t_last, kNoInstance, no_hit(), 0, 0);
     uint at = 0u;
-    while (at < push.node_count) {
+    float enters = 0.0;
+    while (true) {
         // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray
         // Traversal on GPUs", 2009).
-        uint found = kNoInstance;
-        while (at < push.node_count && found == kNoInstance) {
-            InstanceNode node = nodes[at];
-            nearest.cells++;
-            bool meets = walk_meets(node, from, inverse, nearest.t);
-            at = meets ? at + 1u : node.skip;
-            if (meets) found = node.instance;
-        }
+        uint found = next_leaf(at, from, inverse, nearest.t, enters, nearest.cells);
         if (found == kNoInstance) break;
         InstanceRecord instance = instances[found];
         here = sets[instance.set];
-        // A little beyond the nearest, so that of equals the lower number is found.
-        float t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 : kFarVoxels;
-        MarchHit hit = set_march(here.grid, object_ray(instance, from, ray.direction), 0.0, t_end, accelerate);
+        // Beyond the nearest by more than a voxel is long: no voxel with a nearer hit is cut short, so each hit has its bits whatever was found
+        // before, and of equals the lower number is found.
+        float t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 + 2.0 : kFarVoxels;
+        TexelRay local = object_ray(instance, from, ray.direction);
+        float t_begin = 0.0;
+        set_span(local, 0.0, t_begin, t_end);
+        if (t_begin > t_end) continue;
+        MarchHit hit = set_march(here.grid, local, t_begin, t_end, accelerate);
         nearest.cells += hit.cells;
         nearest.voxels += hit.voxels;
         if (hit.state == kMarchMiss) continue;

@@ -75,42 +75,37 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
     vec3 inverse = walk_inverse(l);
     float visible = 1.0;
     uint at = 0u;
-    while (at < push.node_count) {
-        uint found = kNoInstance;
-        float radius = 0.0;
-        float along = 0.0;
+    float enters = 0.0;
+    int looks = 0;
+    InstanceNode leaf = nodes[0];
+    while (true) {
         // To the next leaf first, as in march_sets.glsl.
-        while (at < push.node_count && found == kNoInstance) {
-            InstanceNode node = nodes[at];
-            bool meets = walk_meets(node, p, inverse, t_last);
-            vec3 low = vec3(node.low_x, node.low_y, node.low_z);
-            vec3 high = vec3(node.high_x, node.high_y, node.high_z);
-            vec3 middle = 0.5 * (low + high) - p;
-            radius = 0.5 * length(high - low);
-            along = dot(middle, l);
-            if (!meets && tan_radius > 0.0) {
-                // The cone against the ball around the box.
-                vec3 across = middle - l * along;
-                float reach = radius + max(along + radius, 0.0) * tan_radius;
-                meets = dot(across, across) <= reach * reach && along + radius >= 0.0 && along - radius <= t_last;
-            }
-            at = meets ? at + 1u : node.skip;
-            if (meets) found = node.instance;
-        }
+        uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
         if (found == kNoInstance) break;
         InstanceRecord instance = instances[found];
         here = sets[instance.set];
         TexelRay ray = object_ray(instance, p, l);
         float scale = instance.voxels;
         if (tan_radius <= 0.0) {
-            MarchHit hit = field_march(here.grid, ray, 0.5, t_last * scale, true);
+            float begin = 0.5;
+            float end = t_last * scale;
+            set_span(ray, 0.0, begin, end);
+            if (begin > end) continue;
+            MarchHit hit = field_march(here.grid, ray, begin, end, true);
             if (hit.state != kMarchMiss) return 0.0;
             continue;
         }
         // From where the cone comes near to where it is past; rays to the rim are longer by a little.
+        vec3 low = vec3(leaf.low_x, leaf.low_y, leaf.low_z);
+        vec3 high = vec3(leaf.high_x, leaf.high_y, leaf.high_z);
+        float along = dot(0.5 * (low + high) - p, l);
+        float radius = 0.5 * length(high - low);
         float longer = 1.0 + tan_radius;
         float first = max(0.5, (along - radius) * scale / longer - 1.0);
         float last = min(t_last, (along + radius) * longer) * scale + 1.0;
+        // Where no ray of the cone meets it nothing is hidden; the distances that are stored lie by up to a voxel.
+        set_span(ray, last * tan_radius * longer + 1.0, first, last);
+        if (first > last) continue;
         shadow_whole = ray.whole;
         visible *= shadow_visible(ray.part, ray.direction, tan_radius, ShadowMarch(first, max(last, first), 0.25, kSaturatedVoxels, kShadowSteps));
         if (visible <= 0.0) return 0.0;

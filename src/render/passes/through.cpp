@@ -91,7 +91,7 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
             kMarchGlass, in.size,
             {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
              g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out.nearest)},
-            InstancePush{.node_count = i.node_count, .first_light = 0, .pad_0 = 0, .pad_1 = 0});
+            InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = 0, .pad_0 = 0});
     }
     if (in.has_blends) out.nearest = trace_meshes(g, in, out.nearest, true);
     Image found = g.create("through found", {.size = in.size, .format = rhi::Format::Rgba32Uint});
@@ -321,7 +321,7 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
                 g.read(i.sets), g.read(i.glass_nodes), g.read(i.cells), g.read(in.field.tables),
                 g.read(in.field.distances), g.read(visibility), g.read(surface.words), g.read(fractions), g.write(left),
                 g.write(tints[0]), g.write(tints[1])},
-               InstancePush{.node_count = i.glass_node_count, .first_light = first_light, .pad_0 = 0, .pad_1 = 0});
+               InstancePush{.node_count = i.glass_node_count, .first_light = first_light, .by_tree = 0, .pad_0 = 0});
     fractions = left;
     return tints;
 }

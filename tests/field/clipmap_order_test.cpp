@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: MIT
+// In which order a clipmap makes what is asked of it, what its seams do to normals, and long runs of what shorter tests prove.
+#include "clipmaps.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace kiln::field {
+namespace {
+
+TEST(Clipmap, WhatIsNearIsMadeFirst) {
+    Clipmap map = made(worlds::compiled(country(400)), {0, 0.5, 0}, kSmall);
+    map.work();
+    const dvec3 focus{31, 0.5, -17};
+    map.move(focus);
+    int looked = 0;
+    for (int frame = 0; frame < 200 && !map.work({.bricks = 100}); ++frame) {
+        for (int level = 0; level < 4; ++level) {
+            if (map.counts(level).missing_cells == 0) continue;
+            const double side = double(map.voxel_size(level)) * kBrickVoxels;
+            double made_at = 0, missing_at = 1e9;
+            each_cell(map.window(level), [&](ivec3 c) {
+                const uint32_t word = map.cell_word(level, c);
+                const double away = std::max({std::fabs(c.x + 0.5 - focus.x / side), std::fabs(c.y + 0.5 - focus.y / side),
+                                              std::fabs(c.z + 0.5 - focus.z / side)});
+                // Of the cells of this jump: the window was elsewhere.
+                if (word == kCellMissing) missing_at = std::min(missing_at, away);
+                if ((word & kCellOccupied) != 0 && word != kCellMissing && map.counts(level).baked > 0)
+                    made_at = std::max(made_at, away);
+            });
+            if (made_at == 0 || missing_at > 1e8) continue;
+            EXPECT_LE(made_at, missing_at + 17) << "in blocks of 16 cells, level " << level << " frame " << frame;
+            ++looked;
+        }
+    }
+    EXPECT_GT(looked, 5);
+}
+
+TEST(Clipmap, OlderChangesShowFirstAndEachOnlyWhole) {
+    std::vector<Edit> edits = country(200);
+    worlds::Live live(edits);
+    Clipmap map = made(live.program(), {0, 0.5, 0}, kSmall);
+    map.work();
+    const auto before = map.program();
+    const auto change = [&](vec3 at) {
+        edits.push_back(worlds::edit(Sphere{.radius = 3}, at));
+        map.edit(live.program(), live.become(edits));
+        return map.program();
+    };
+    const auto older = change({2, 0, 1});
+    EXPECT_FALSE(map.work({.bricks = 40}));
+    const auto newer = change({-2, 0, -2});
+    int older_alone = 0, frames = 0;
+    for (bool done = false; !done && frames < 500; ++frames) {
+        done = map.work({.bricks = 40});
+        bool any_newer = false, all_older = true;
+        for (int level = 0; level < 4; ++level) {
+            const auto& shown = map.level_program(level);
+            ASSERT_TRUE(shown == before || shown == older || shown == newer) << "nothing in between";
+            any_newer = any_newer || shown == newer;
+            all_older = all_older && shown != before;
+        }
+        EXPECT_TRUE(!any_newer || all_older) << "the newer one was shown before the older one, frame " << frames;
+        older_alone += all_older && !any_newer;
+        if (frames % 8 == 2) expect_is_its_program(map, frames % 4, "frame " + std::to_string(frames));
+    }
+    EXPECT_LT(frames, 500);
+    EXPECT_GT(older_alone, 0);
+    for (int level = 0; level < 4; ++level) EXPECT_EQ(map.level_program(level), newer);
+}
+
+// A ball so large that its normal hardly turns between two rays: what turns is the seam.
+TEST(Clipmap, NormalsTurnByLessThanADegreeAcrossBricksAndZones) {
+    const float radius = 60;
+    const auto program = worlds::compiled({worlds::edit(Sphere{.radius = radius}, {0, -radius, 0})});
+    for (const bool whole : {true, false}) {
+        Clipmap map = made(program, {0.3, 0.5, 0.2}, kSmall);
+        map.work({.bricks = 400});
+        if (whole) map.work();
+        const auto degrees = [](vec3 a, vec3 b) {
+            return std::atan2(double(length(cross(a, b))), double(dot(a, b))) * 180 / std::numbers::pi;
+        };
+        int seams = 0, rays = 0;
+        double worst = 0;
+        for (const double z : {0.2, 1.9, -6.3}) {
+            Clipmap::Hit last;
+            vec3 exact_last;
+            for (double x = -30; x < 30; x += 0.0125) {
+                const Clipmap::Hit hit = map.cast({x, 5, z}, {0, -1, 0}, 1e6);
+                ASSERT_EQ(hit.state, kMarchHit) << x;
+                const vec3 exact = normalize(vec3{float(x), float(5 - hit.t) + radius, float(z)});
+                if (rays++ % 4800 != 0) {
+                    worst = std::max(worst, degrees(hit.normal, last.normal) - degrees(exact, exact_last));
+                    seams += hit.level != last.level;
+                }
+                last = hit;
+                exact_last = exact;
+            }
+        }
+        EXPECT_LE(worst, 1) << (whole ? "whole" : "while cells are missing");
+        EXPECT_GE(seams, 6);
+    }
+}
+
+TEST(ClipmapSlow, AMillionSamplesSayNoMoreThanTheTrueDistance) {
+    const auto program = worlds::compiled(country());
+    Clipmap map = made(program, {0.3, 0.5, 0.2}, kSmall);
+    map.work();
+    worlds::Random r(14);
+    for (int level = 0; level < 4; ++level) {
+        const float h = map.voxel_size(level);
+        std::vector<std::pair<ivec3, uint32_t>> bricks;
+        each_cell(map.window(level), [&](ivec3 c) {
+            const uint32_t word = map.cell_word(level, c);
+            if ((word & kCellOccupied) != 0) bricks.emplace_back(c, word & kCellSlotMask);
+        });
+        int wrong = 0;
+        const auto size_at = [&](ivec3 c, vec3 t) {
+            return std::fabs(exact(*program, {double(h) * (c.x * 7 + double(t.x)), double(h) * (c.y * 7 + double(t.y)),
+                                              double(h) * (c.z * 7 + double(t.z))})) /
+                   double(h);
+        };
+        for (int i = 0; i < 250000; ++i) {
+            const auto& [cell, slot] = bricks[size_t(r.below(int(bricks.size())))];
+            const BrickContent& brick = map.content(slot);
+            const auto texel = [&](ivec3 t) { return double(brick.distance(size_t((t.z * 8 + t.y) * 8 + t.x))); };
+            const ivec3 t{r.below(8), r.below(8), r.below(8)};
+            const double size = size_at(cell, {float(t.x), float(t.y), float(t.z)});
+            wrong += !(std::fabs(texel(t)) <= size + std::max(0.002 * std::min(size, 4.0), 1e-3));
+            // Between texels, of this level alone.
+            const ivec3 v{r.below(7), r.below(7), r.below(7)};
+            const vec3 f{r.in(0, 1), r.in(0, 1), r.in(0, 1)};
+            double mean = 0;
+            for (int corner = 0; corner < 8; ++corner) {
+                const ivec3 at{v.x + (corner & 1), v.y + (corner >> 1 & 1), v.z + (corner >> 2)};
+                const double w = double((corner & 1) != 0 ? f.x : 1 - f.x) * double((corner & 2) != 0 ? f.y : 1 - f.y) *
+                                 double((corner & 4) != 0 ? f.z : 1 - f.z);
+                mean += w * texel(at);
+            }
+            const double between = size_at(cell, {float(v.x) + f.x, float(v.y) + f.y, float(v.z) + f.z});
+            wrong += !(std::fabs(mean) - 0.8661 <= between + 0.005);
+        }
+        EXPECT_EQ(wrong, 0) << "level " << level;
+    }
+}
+
+// The figures of the clipmap: 60 Hz, 10 m/s, 2 cm, six levels.
+TEST(ClipmapSlow, AFlightMakesNoMoreThanItsShellsInAnyFrame) {
+    constexpr uint32_t kBudget = 1024;
+    Clipmap map = made(worlds::compiled(country(2000)), {0, 1, 0}, {.voxel_size = 0.02f, .levels = 6, .cells = 64});
+    map.work();
+    int64_t entered = 0, cells = 0;
+    for (int frame = 0; frame < 240; ++frame) {
+        ivec3 old[6];
+        for (int level = 0; level < 6; ++level) old[level] = map.first_cell(level);
+        map.move({frame * 10.0 / 60, 1, 0.1});
+        int64_t left[6];
+        for (int level = 0; level < 6; ++level) {
+            const ivec3 by = map.first_cell(level) - old[level];
+            const auto stays = [](int d) { return int64_t(64 - std::min(std::abs(d), 64)); };
+            ASSERT_EQ(map.counts(level).entered_cells, 64 * 64 * 64 - stays(by.x) * stays(by.y) * stays(by.z));
+            entered += map.counts(level).entered_cells;
+            left[level] = map.counts(level).missing_cells;
+        }
+        map.work({.bricks = kBudget});
+        uint32_t bricks = 0;
+        for (int level = 0; level < map.all_levels(); ++level) {
+            bricks += map.counts(level).baked;
+            if (level >= 6) continue;
+            ASSERT_LE(int64_t(map.counts(level).cells_made), left[level]) << "frame " << frame << " level " << level;
+            ASSERT_LE(map.counts(level).baked, map.counts(level).cells_made);
+            cells += int64_t(map.counts(level).cells_made);
+        }
+        ASSERT_LE(bricks, kBudget);
+        ASSERT_EQ(map.shown_levels(), 6) << "the last level keeps up";
+    }
+    EXPECT_LE(cells, entered);
+    EXPECT_GT(cells, entered / 2) << "it keeps up";
+    map.work();
+    map.work();
+    for (int level = 0; level < 6; ++level) EXPECT_EQ(map.counts(level).cells_made, 0u) << "a steady camera";
+}
+
+}  // namespace
+}  // namespace kiln::field
