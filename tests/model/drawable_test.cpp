@@ -241,6 +241,61 @@ TEST(Drawable, EveryBrokenReferenceIsOneErrorThatNamesTheElement) {
                 HasSubstr("materials[0].baseColorTexture names texture 5 of 0"));
 }
 
+// Sizes that no file holds, bytes that are not there, numbers that are none.
+TEST(Drawable, AbsurdSizesAndMissingBuffersAreOneErrorThatNamesTheElement) {
+    const auto with = [](auto change) {
+        SquareGlb g;
+        change(g);
+        return fault(g.whole());
+    };
+    const auto swap = [](std::string& text, const std::string& from, const std::string& to) {
+        const size_t at = text.find(from);
+        ASSERT_NE(at, std::string::npos) << from;
+        text.replace(at, from.size(), to);
+    };
+    for (const char* count : {"99", "4294967295", "4000000000000000000"})
+        EXPECT_THAT(with([&](SquareGlb& g) { swap(g.accessors, "\"count\":4", std::string("\"count\":") + count); }),
+                    HasSubstr("meshes[0].primitives[0].POSITION: refers to bytes outside its buffer"))
+            << count;
+    // A view that claims more than there is harms nobody who reads less.
+    SquareGlb claims;
+    swap(claims.views, "\"byteLength\":48", "\"byteLength\":4000000000");
+    EXPECT_THAT(good(claims.whole()).notes, testing::IsEmpty());
+    EXPECT_THAT(with([&](SquareGlb& g) { swap(g.views, "\"buffer\":0", "\"buffer\":3"); }),
+                HasSubstr("meshes[0].primitives[0].POSITION: refers to a buffer that does not exist"));
+    EXPECT_THAT(
+        with([](SquareGlb& g) { g.rest = ",\"skins\":[{\"joints\":[9]}]", g.nodes = "{\"mesh\":0,\"skin\":0}"; }),
+        HasSubstr("skins[0]"));
+    EXPECT_THAT(with([](SquareGlb& g) {
+                    const int times = g.floats({0, 1}, "SCALAR", 1), moves = g.floats({0, 0, 0, 2, 0, 0}, "VEC3", 3);
+                    g.rest = ",\"animations\":[{\"samplers\":[{\"input\":" + std::to_string(times) +
+                             ",\"output\":" + std::to_string(moves) +
+                             "}],\"channels\":[{\"sampler\":0,\"target\":{\"node\":9,\"path\":\"translation\"}}]}]";
+                }),
+                HasSubstr("animations[0]"));
+    EXPECT_THAT(with([](SquareGlb& g) { g.nodes = "{\"mesh\":0,\"scale\":[1e300,1,1]}"; }), HasSubstr("nodes[0]"));
+    const std::string gone =
+        "{\"asset\":{\"version\":\"2.0\"},\"buffers\":[{\"byteLength\":48,\"uri\":\"gone.bin\"}],\"bufferViews\":[{"
+        "\"buffer\":0,"
+        "\"byteLength\":48}],\"accessors\":[{\"bufferView\":0,\"componentType\":5126,\"count\":4,\"type\":\"VEC3\"}],"
+        "\"meshes\":[{\"primitives\":[{\"attributes\":{\"POSITION\":0}}]}],\"nodes\":[{\"mesh\":0}],\"scenes\":[{"
+        "\"nodes\":[0]}]}";
+    EXPECT_THAT(fault(gone), HasSubstr("gone.bin"));
+    // A picture larger than any: a note, and the rest is drawn.
+    SquareGlb g;
+    const unsigned char png[] = {0x89, 'P',  'N',  'G',  13,   10,   26,   10, 0, 0, 0, 13, 'I', 'H', 'D', 'R', 0x7f,
+                                 0xff, 0xff, 0xff, 0x7f, 0xff, 0xff, 0xff, 8,  6, 0, 0, 0,  0,   0,   0,   0};
+    const int view = g.add_bytes(std::as_bytes(std::span(png)));
+    g.material = ",\"material\":0";
+    g.materials = "{\"pbrMetallicRoughness\":{\"baseColorTexture\":{\"index\":0}}}";
+    g.rest = ",\"textures\":[{\"source\":0}],\"images\":[{\"mimeType\":\"image/png\",\"bufferView\":" +
+             std::to_string(view) + "}]";
+    const Drawable d = good(g.whole());
+    ASSERT_EQ(d.notes.size(), 1u);
+    EXPECT_THAT(d.notes[0], HasSubstr("images[0]"));
+    EXPECT_EQ(d.surfaces[0].base_texture.image, -1);
+}
+
 TEST(Drawable, AnImageOfAnotherKindIsANoteAndTheRestIsDrawn) {
     SquareGlb g;
     const std::string webp = "RIFF....WEBP";

@@ -63,6 +63,27 @@ TEST_F(ClusterGpu, ListsGiveTheSumsOfAllLights) {
     compare(frame, 72, 56);
 }
 
+// Lamps whose reach ends on borders of tiles, or whose middle is on one, and depths where a tile's nearest and farthest end.
+TEST_F(ClusterGpu, LightsOnBordersOfTilesAreInBoth) {
+    Frame frame = frame_of(on_ground());
+    const shade::CameraParams eye = shade::camera_params(frame.camera, 64, 48);
+    frame.lights.clear();
+    for (int y = 0; y <= 48; y += kClusterSide) {
+        for (int x = 0; x <= 64; x += kClusterSide) {
+            const vec3 d = shade::camera_direction_at(eye, float(x), float(y));
+            for (const float far : {1.0f, 2.5f, 3.5f}) {
+                const float pixel = far * length(vec3{eye.up.x, eye.up.y, eye.up.z}) / 24;
+                for (const float reach : {0.5f * pixel, float(kClusterSide) * pixel})
+                    frame.lights.push_back({.kind = Light::Kind::Point,
+                                            .position = frame.camera.position + d * far,
+                                            .intensity = 0.05f,
+                                            .range = reach});
+            }
+        }
+    }
+    compare(frame, 64, 48);
+}
+
 TEST_F(ClusterGpu, FourThousandLightsLoseNone) {
     Frame frame = frame_of(on_ground());
     frame.lights = many_lights(4096, 4096);

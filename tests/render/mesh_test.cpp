@@ -89,7 +89,7 @@ TEST_F(MeshGpu, AMeshSphereIsTheFieldsSphere) {
     EXPECT_LE(turned, 0.5) << "degrees";
     const Picture lit_a = picture(field), lit_b = picture(mesh);
     const double flip = image::flip(rgb_of(lit_a), rgb_of(lit_b));
-    EXPECT_LE(flip, 0.01);
+    EXPECT_LE(flip, 0.005);
     RecordProperty("depth", std::to_string(far));
     RecordProperty("normal", std::to_string(turned));
     RecordProperty("flip", std::to_string(flip));

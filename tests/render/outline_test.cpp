@@ -205,9 +205,11 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
 TEST_F(OutlineGpu, AreTheSameFromEveryDistance) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP() << "no Vulkan device";
-    for (const float far : {2.0f, 6.0f}) {
+    for (const float far : {1.0f, 2.0f, 6.0f, 10.0f, 50.0f}) {
         Frame frame = frame_of(field::worlds::sphere_of(10), {0, 0, far});
         frame.camera.target = {0, 0, 0};
+        // So that it is seen at all from so far, and not larger than the picture from so near.
+        frame.camera.fov_y_deg = std::clamp(170 / far, 4.5f, 85.0f);
         const Picture plain = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
         frame.outlines = {{frame.field->program().rows()[0], Outline{.color = {1, 0, 0}, .width_px = 4}}};
         const Picture lined = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));

@@ -140,7 +140,7 @@ Frame hills() {
     return frame;
 }
 
-// Gate: a moving camera changes at most a thousandth of the texels; where the snapped square is the same, none.
+// Gate (sub-texel moves too): a moving camera changes at most a thousandth of the texels; where the snapped square is the same, none.
 TEST_F(ShadowMapsGpu, KeepTheirTexelsWhenTheCameraMoves) {
     constexpr int kSide = 256;
     Frame frame = hills();
@@ -263,6 +263,91 @@ TEST_F(ShadowCascadesGpu, LeaveNoGapBetweenMapsAndNoStripesOnAPlane) {
     const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
     EXPECT_GE(renderer->stats().cascades, 3);
     EXPECT_LE(apart(rays, maps), 0.02);
+}
+
+image::Rgb shown(const Picture& p) {
+    image::Rgb out{p.width, p.height, {}};
+    for (size_t i = 0; i < p.srgb.size(); ++i)
+        if (i % 4 != 3) out.values.push_back(float(p.srgb[i]) / 255);
+    return out;
+}
+
+// Gate: where one map ends and the next begins, nothing of it is seen, in light or inside a shadow that reaches over all maps: pixels that rays
+// draw as flat as their neighbours are as flat, to one step of the screen's 255.
+TEST_F(ShadowCascadesGpu, BandsWhereMapsMeetHaveNoStep) {
+    const model::Surface grey = meshes::matte({0.6f, 0.6f, 0.6f});
+    field::worlds::World w;
+    w.name = "speck";
+    w.edits = {field::worlds::edit(Sphere{.radius = 0.1f}, {0, -3, 0})};
+    w.options.voxel_size = 0.05f;
+    w.options.bounds = Box3{{-0.2f, -3.2f, -0.2f}, {0.2f, -2.8f, 0.2f}};
+    Frame frame = frame_of(w, {0, 1.2f, 3});
+    frame.camera.target = {0, 0.3f, 0};
+    frame.environment = Environment{.color = {0.2f, 0.2f, 0.2f}};
+    // A roof over the left half of all that is seen.
+    frame.meshes = {meshes::at(meshes::sheet(-30, -30, 30, 30, grey), {0, 0, 0}),
+                    meshes::at(meshes::sheet(-12, -27, -0.4f, 3, grey), {0, 4, 0})};
+    frame.lights = {{.kind = Light::Kind::Directional, .direction = {0.1f, -1, 0.05f}, .angular_diameter_deg = 0.53f}};
+    const Picture rays = picture(frame, MeshShadows::Rays), maps = picture(frame, MeshShadows::Cascades);
+    ASSERT_GE(renderer->stats().cascades, 3);
+    const auto luma = [](const Picture& p, int x, int y) {
+        const uint8_t* c = &p.srgb[size_t(y * p.width + x) * 4];
+        return 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+    };
+    // Where all around a pixel is as bright, no shadow ends: what the maps' steps are then is theirs alone.
+    constexpr int kAround = 3;
+    int bright = 0, dark = 0;
+    double worst = 0;
+    std::string where;
+    for (int y = kAround; y + kAround < rays.height; ++y) {
+        for (int x = kAround; x + kAround < rays.width; ++x) {
+            double uneven = 0;
+            for (int j = -kAround; j <= kAround; ++j)
+                for (int i = -kAround; i <= kAround; ++i)
+                    uneven = std::max(uneven, std::fabs(luma(rays, x + i, y + j) - luma(rays, x, y)));
+            if (uneven > 3 || std::isinf(rays.depth[size_t((y - kAround) * rays.width + x)])) continue;
+            (luma(rays, x, y) > 128 ? bright : dark) += 1;
+            const double here = luma(maps, x, y) - luma(rays, x, y);
+            const double step = std::max(std::fabs(here - (luma(maps, x - 1, y) - luma(rays, x - 1, y))),
+                                         std::fabs(here - (luma(maps, x, y - 1) - luma(rays, x, y - 1))));
+            if (step <= worst) continue;
+            worst = step;
+            where = std::to_string(x) + ", " + std::to_string(y);
+        }
+    }
+    EXPECT_GT(bright, 500);
+    EXPECT_GT(dark, 500);
+    EXPECT_LE(worst, 1.0) << "of 255, at " << where;
+}
+
+// Gate: a caster of the field, whose shadow is marched, and its twin of triangles, whose shadow is in maps.
+TEST_F(ShadowCascadesGpu, ACasterOfTrianglesIsItsTwinOfTheField) {
+    for (const float sun : {0.53f, 3.0f}) {
+        Picture pictures[2];
+        for (const bool mesh : {false, true}) {
+            field::worlds::World w;
+            w.name = "twin";
+            w.edits = {field::worlds::edit(Box{.half_extents = {1.4f, 0.1f, 1.4f}}, {0, -0.6f, 0})};
+            if (!mesh) w.edits.push_back(field::worlds::edit(Sphere{.radius = 0.3f}, {-0.1f, 0.1f, 0}));
+            w.options.voxel_size = 0.05f;
+            w.options.bounds = Box3{{-1.5f, -1.5f, -1.5f}, {1.5f, 1.5f, 1.5f}};
+            Frame frame = frame_of(w, {0.9f, 1.3f, 2.6f});
+            frame.materials = {{.base_color = {0.6f, 0.6f, 0.6f}, .roughness = 1},
+                               {.base_color = {0.6f, 0.6f, 0.6f}, .roughness = 1}};
+            frame.lights = {
+                {.kind = Light::Kind::Directional, .direction = {0.5f, -1, 0.3f}, .angular_diameter_deg = sun}};
+            frame.environment = Environment{.color = {0.1f, 0.1f, 0.1f}};
+            if (mesh)
+                frame.meshes = {
+                    meshes::at(meshes::sphere(0.3f, 128, meshes::matte({0.6f, 0.6f, 0.6f}, 1)), {-0.1f, 0.1f, 0})};
+            pictures[mesh ? 1 : 0] =
+                rhi::must(renderer->render(frame, {.width = 96, .height = 72, .mesh_shadows = MeshShadows::Cascades}));
+            EXPECT_EQ(renderer->stats().mesh_shadows, mesh ? "cascades" : "rays");
+        }
+        const double flip = image::flip(shown(pictures[0]), shown(pictures[1]));
+        RecordProperty("flip", std::to_string(flip));
+        EXPECT_LE(flip, 0.01) << sun;
+    }
 }
 
 TEST_F(ShadowCascadesGpu, CastHolesAndLampsHaveMapsToo) {

@@ -21,6 +21,17 @@ KILN_FN vec3 environment_color(uint at) {
                 uintBitsToFloat(environment_word(at + 2u)));
 }
 
+// A texel of a level. Round it goes on; beyond a pole, half a turn farther.
+KILN_FN vec3 environment_texel(uint first, int width, int height, int x, int y) {
+    if (y < 0 || y >= height) {
+        y = y < 0 ? -1 - y : 2 * height - 1 - y;
+        x = x + width / 2;
+    }
+    x = x < 0 ? x + width : x;
+    x = x >= width ? x - width : x;
+    return environment_color(first + 3u * uint(y * width + x));
+}
+
 // Level 0 is the image, level i the mean over the lobe of roughness i / kEnvironmentLobes. Between texels: bilinear.
 KILN_FN vec3 environment_sample(uint level, vec3 direction) {
     uint first = environment_word(kEnvironmentLevels + 4u * level);
@@ -29,18 +40,15 @@ KILN_FN vec3 environment_sample(uint level, vec3 direction) {
     float turn = atan(direction.x, -direction.z) / kTwoPi + 0.5f;
     float fall = acos(clamp(direction.y, -1.0f, 1.0f)) / kPi;
     float x = turn * float(width) - 0.5f;
-    float y = clamp(fall * float(height) - 0.5f, 0.0f, float(height - 1));
+    float y = clamp(fall * float(height), 0.0f, float(height)) - 0.5f;
     int x_0 = int(floor(x));
     int y_0 = int(floor(y));
     float s = x - float(x_0);
     float t = y - float(y_0);
-    int x_1 = x_0 + 1 >= width ? x_0 + 1 - width : x_0 + 1;
-    x_0 = x_0 < 0 ? x_0 + width : x_0;
-    int y_1 = y_0 + 1 < height ? y_0 + 1 : y_0;
-    vec3 top = mix(environment_color(first + 3u * uint(y_0 * width + x_0)),
-                   environment_color(first + 3u * uint(y_0 * width + x_1)), s);
-    vec3 low = mix(environment_color(first + 3u * uint(y_1 * width + x_0)),
-                   environment_color(first + 3u * uint(y_1 * width + x_1)), s);
+    vec3 top = mix(environment_texel(first, width, height, x_0, y_0),
+                   environment_texel(first, width, height, x_0 + 1, y_0), s);
+    vec3 low = mix(environment_texel(first, width, height, x_0, y_0 + 1),
+                   environment_texel(first, width, height, x_0 + 1, y_0 + 1), s);
     return mix(top, low, t);
 }
 
