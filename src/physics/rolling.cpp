@@ -27,8 +27,7 @@ Velocities resist_rolling(const MassProperties& mass, const Pose& pose, const Ve
     const vec3 moments{float(mass.moments.x), float(mass.moments.y), float(mass.moments.z)};
     const auto momentum = [&](vec3 w) {
         const vec3 local = direction_into(pose, w);
-        vec3 out =
-            rotate(pose.rotation, {moments.x * local.x, moments.y * local.y, moments.z * local.z});
+        vec3 out = rotate(pose.rotation, {moments.x * local.x, moments.y * local.y, moments.z * local.z});
         if (rolls) out = out + (w * (reach * reach) - arm * dot(arm, w)) * kilos;
         return out;
     };
@@ -37,8 +36,8 @@ Velocities resist_rolling(const MassProperties& mass, const Pose& pose, const Ve
     const float volume = dot(a, cross(b, c));
     if (!(volume > 0)) return now;
     const vec3 moved = cross(arm, gravity) * (-kilos * seconds);  // by gravity, about where it touches
-    const vec3 turned = rolls ? vec3{dot(cross(b, c), moved), dot(cross(c, a), moved), dot(cross(a, b), moved)} / volume
-                              : vec3{};
+    const vec3 turned =
+        rolls ? vec3{dot(cross(b, c), moved), dot(cross(c, a), moved), dot(cross(a, b), moved)} / volume : vec3{};
     const vec3 would = spin + turned;
     const float size = length(momentum(would));
     if (!(size > 0)) return now;

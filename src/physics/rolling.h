@@ -11,10 +11,10 @@ namespace kiln::physics {
 
 /// What a body lies on, in the world.
 struct Support {
-    vec3 point{}, normal{};            ///< mean of where it touches; unit, out of what it lies on
-    vec3 velocity{}, spin{};           ///< of what it lies on, there
-    float rolling_friction = 0;        ///< the largest of its contacts
-    float impulse = 0;                 ///< N s that held it up in the last step, along the normal
+    vec3 point{}, normal{};      ///< mean of where it touches; unit, out of what it lies on
+    vec3 velocity{}, spin{};     ///< of what it lies on, there
+    float rolling_friction = 0;  ///< the largest of its contacts
+    float impulse = 0;           ///< N s that held it up in the last step, along the normal
 };
 
 struct Velocities {

@@ -74,7 +74,8 @@ TEST_P(Rolling, ABallStaysOnASlopeUpToItAndRollsOnASteeperOne) {
 TEST_P(Rolling, ASpunBallAndARockingEggComeToRest) {
     Scene s(engine());
     ground(s, edit(Plane{}), 0.1f);
-    const BodyId spun = s.add({.shape = Convex::sphere(0.3f), .pose = {{0, 0.3f, 0}, {}}, .angular_velocity = {0, 6, 0}});
+    const BodyId spun =
+        s.add({.shape = Convex::sphere(0.3f), .pose = {{0, 0.3f, 0}, {}}, .angular_velocity = {0, 6, 0}});
     const BodyId egg = s.add({.shape = moving({edit(Ellipsoid{.radii = {0.35f, 0.25f, 0.3f}})}),
                               .pose = {{3, 0.3f, 0}, axis_angle({0, 0, 1}, 0.4f)}});
     s.run(5);
@@ -102,7 +103,8 @@ INSTANTIATE_TEST_SUITE_P(Engines, Rolling, testing::Combine(testing::ValuesIn(en
 
 TEST(ResistRolling, ShortensWhatGravityWouldMakeAndNeverTurnsItRound) {
     const MassProperties ball{.mass = 2, .moments = {0.2, 0.2, 0.2}};  // radius 0.5
-    const Support flat{.point = {0, -0.5f, 0}, .normal = {0, 1, 0}, .rolling_friction = 0.1f, .impulse = 2 * 9.81f / 60};
+    const Support flat{
+        .point = {0, -0.5f, 0}, .normal = {0, 1, 0}, .rolling_friction = 0.1f, .impulse = 2 * 9.81f / 60};
     const vec3 g{0, -9.81f, 0};
     const Velocities rolling{{2, 0, 0}, {0, 0, -4}};
     const Velocities after = resist_rolling(ball, {}, rolling, flat, g, 1.0f / 60);
