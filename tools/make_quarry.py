@@ -74,6 +74,18 @@ TOP = 9.4
 WIDTH = 11.0  # half
 
 
+BOULDERS = [  # radii, seed, where it lies, how it is turned, and its push
+    ((0.42, 0.36, 0.40), 21, (-2.501, 3.002, -0.551), (-0.0018, 0, 0.0014, 1), (0.1, 0, 2.2)),
+    ((0.34, 0.30, 0.38), 22, (0.899, 5.299, -2.601), (-0.0006, 0, 0.0014, 1), (-0.1, 0, 1.8)),
+    ((0.30, 0.27, 0.31), 23, (3.307, 7.505, -4.501), (0.0002, -0.0002, -0.0126, 0.9999), (0.2, 0, 2.2)),
+    ((0.38, 0.33, 0.36), 24, (8.092, 2.992, -0.471), (0.0471, -0.0006, 0.014, 0.9988), (0.1, 0, 1.1)),
+    ((0.55, 0.48, 0.52), 25, (-9.447, 0.492, 2.281), (0.3381, -0.0131, 0.2002, 0.9195), None),
+    ((0.33, 0.28, 0.30), 26, (-8.024, 0.277, 2.358), (-0.0336, 0.0381, 0.0584, 0.997), None),
+    ((0.46, 0.40, 0.44), 27, (3.023, 0.447, 2.469), (0.4893, -0.0114, -0.1618, 0.8569), None),
+    ((0.28, 0.25, 0.27), 28, (9.281, 0.254, 2.300), (0.2898, -0.0169, 0.0539, 0.9554), None),
+]
+
+
 def face_z(y):
     """Front of the rock at height y."""
     z = BENCHES[0][1]
@@ -183,6 +195,17 @@ def main():
             shape["rounding"] = tidy(size * 0.12)
         else:
             shape["radius"] = tidy(size * 1.1)
+    # Boulders: where they lie (what `kiln simulate` says after ten seconds), and those on the brinks with the push that sends them down.
+    bodies = []
+    for radii, seed, position, turn, push in BOULDERS:
+        s.add("boulder", shape="ellipsoid", radii=list(radii), position=list(position), rotation=turn,
+              material=rnd.choose(["limestone", "pale", "ochre", "slate"]),
+              domain=[{"warp": "displace", "amplitude": tidy(0.12 * min(radii)), "frequency": 2.2, "seed": seed}])
+        body = {"id": s.edits[-1]["id"], "edits": [s.edits[-1]["id"]], "density": 2600, "friction": 0.7}
+        if push:
+            body["linear_velocity"] = list(push)
+            body["angular_velocity"] = [tidy(push[2] / radii[1]), 0, tidy(-push[0] / radii[1])]
+        bodies.append(body)
     # Grass where nobody digs.
     s.add("grass", shape="box", op="paint", material_blend_radius=0.25, half_extents=[WIDTH + 1, 0.45, 4], position=[0, TOP + 0.28, -9.2], material="grass")
 
@@ -209,6 +232,8 @@ def main():
                 {"shape": "cylinder", "half_height": 0.6, "radius": 0.04, "position": [0.4, 0.2, 0.56]}]},
         },
         "edits": s.edits,
+        "physics": {"friction": 0.7, "rolling_friction": 0.3},
+        "bodies": bodies,
         "lights": [{"type": "directional", "direction": [0.62, -0.66, -0.52], "illuminance": 4.6, "color": [1, 0.86, 0.66], "angular_diameter_deg": 0.8}],
         "environment": {"color": [0.30, 0.48, 0.85], "intensity": 0.7},
         "cameras": {

@@ -11,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace kiln::cli {
 
@@ -19,7 +20,7 @@ namespace {
 struct Options {
     std::string scene, edits, ground = "field";
     SimulateSettings settings;
-    std::string out;
+    std::string out, keep;
     PictureOptions pictures;
     bool png = false;
     bool json = false;
@@ -49,16 +50,31 @@ int simulate(const Options& o) {
         return fail(Error{"--out is for pictures; add --png", ErrorKind::Usage});
     }
     Progress progress;
-    const auto shoot = [&](Play& play) {
-        progress.stage("picture " + std::to_string(film->pictures()));
-        return film->shoot(play);
+    std::optional<World> kept;
+    double before = 0;
+    const auto each = [&](Play& play) -> Result<void> {
+        if (film) {
+            progress.stage("picture " + std::to_string(film->pictures()));
+            if (auto shot = film->shoot(play); !shot) return shot;
+        }
+        // The last frame is within half a step of the end, and frames are a step apart at least; an earlier one that is as near is taken back.
+        const double apart = play.time() - std::exchange(before, play.time());
+        if (o.keep.empty() || play.time() < settings.seconds - 0.6 * apart) return {};
+        auto fresh = World::load(o.scene);
+        if (!fresh) return fresh.error();
+        kept = std::move(*fresh);
+        return play.keep(*kept);
     };
     const Stopwatch watch;
-    const auto ways = world->simulate_json(settings, film ? shoot : std::function<Result<void>(Play&)>());
+    const auto ways = world->simulate_json(settings, each);
     progress.stage("");
     if (!ways) return fail(ways.error());
     if (film)
         say("wrote    " + std::to_string(film->pictures()) + " pictures, " + o.out + "/frame_00000.png and so on");
+    if (kept) {
+        if (auto saved = kept->save(o.keep); !saved) return fail(saved.error());
+        say("wrote    " + o.keep + ", the scene as it was then");
+    }
     if (o.json) {
         (void)put(*ways);
     } else {
@@ -79,6 +95,7 @@ void add_simulate(CLI::App& app, Run& run) {
         "Examples:\n"
         "  kiln simulate tumble --seconds 2 --every 0.5 --json\n"
         "  kiln simulate scene.kiln.json --seconds 10 --backend bullet --field-bodies --json\n"
+        "  kiln simulate quarry --seconds 10 --edits digs.jsonl --keep dug.kiln.json\n"
         "  kiln simulate tumble --seconds 4 --every 0.1 --out pictures --png --size 640x360 --view contacts");
     verb->add_option("scene", o->scene, "scene file, or the name of a bundled scene")->required();
     verb->add_option("--seconds", o->settings.seconds, "how long")->required();
@@ -89,8 +106,12 @@ void add_simulate(CLI::App& app, Run& run) {
     verb->add_option("--ground", o->ground,
                      "what convex bodies touch: the ground's field, or triangles where it has settled")
         ->check(CLI::IsMember({"field", "mesh"}));
-    verb->add_option("--edits", o->edits,
-                     "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like");
+    verb->add_option(
+        "--edits", o->edits,
+        "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like; with "
+        "\"target\" they act on bodies too");
+    verb->add_option("--keep", o->keep,
+                     "scene file to write: what the scene is at the end, bodies and parts where they are");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");
     verb->add_option("--out", o->out, "folder, which must be there, for --png");
     verb->add_flag("--png", o->png, "a picture of each frame: frame_00000.png and so on");

@@ -42,6 +42,7 @@ struct Material {
     /// … and what is left of white light after attenuation_distance metres inside (Beer and Lambert); 0 metres: all of it
     vec3 attenuation_color{1, 1, 1};
     float attenuation_distance = 0;
+    float rolling_friction = 0;  ///< >= 0: the tangent of the slope on which a ball begins to roll
     friend bool operator==(const Material&, const Material&) = default;
 };
 

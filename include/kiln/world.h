@@ -254,9 +254,17 @@ class Play {
 public:
     /// `seconds` and `every` of the settings say nothing here.
     static Result<Play> start(const World& world, const SimulateSettings& settings = {});
+    /// Plays a world that is being edited. What commands do to the world, and what they cut loose, is done to it at once, in an open group
+    /// of its history: a program that ends in play, however it ends, leaves it all in the journal as one step behind what was there before.
+    /// end with stop() or keep(); nothing else may change the world until then.
+    static Result<Play> begin(World& world, const SimulateSettings& settings = {});
     Play(Play&&) noexcept;
     Play& operator=(Play&&) noexcept;
     ~Play();
+    /// Of begin(): the world is what it was then. What the play did stays in its history, as a branch.
+    Result<void> stop();
+    /// Of begin(): the world is what the play has become, with bodies and parts where they are, as one step.
+    Result<void> keep();
 
     /// One fixed step: commands whose time has come, then physics.
     Result<void> step();
@@ -265,7 +273,8 @@ public:
     /// Of the last step, seconds.
     double time() const;
     double dropped_seconds() const { return dropped_; }
-    /// A change of the world's own edits, {"add": EDIT} and the like, before the next step.
+    /// A change of the world's own edits, {"add": EDIT} and the like, before the next step; with "target" ("bodies", "all" or a body's id)
+    /// an edit acts on bodies too, or alone.
     Result<void> apply(const std::string& command, const std::string& name = "command");
     /// Makes another world, or the one that was played, which must be as it was at the start, what this one has become: commands, parts
     /// that came loose (as `dynamic` edits where they are, in flight too) and those that settled. One step of its history.
@@ -287,6 +296,9 @@ private:
     std::unique_ptr<scene::Simulation> simulation_;
     double ahead_ = 0, dropped_ = 0;  // seconds
     float between_ = 1;               // the step before … the last one
+    struct Session;
+    std::unique_ptr<Session> session_;  // of begin()
+    Result<void> tell();                // the session's world
 };
 
 /// A physics engine that this build has; `why_not` says why it cannot run on this machine, empty when it can.

@@ -28,7 +28,7 @@ constexpr int kBodies = 1000, kTori = 100, kSteps = 240;        // 4 s: fallen, 
 constexpr float kTorusMajor = 0.35f, kTorusMinor = 0.12f;
 constexpr int kMostRuns = 3;
 constexpr float kEditCells = 64;
-constexpr int kEdits = 16;
+constexpr int kEdits = 16, kMeshedEdits = 6;
 
 Edit placed(Shape shape, vec3 at, Op op = Op::Union, float blend = 0) {
     Edit e;
@@ -104,8 +104,10 @@ public:
         if (run_.wanted("physics", "bodies.1000"))
             pile("bodies.1000", terrain(run_.options.seed), &PhysicsRows::add_bodies, true);
         if (run_.wanted("physics", "tori.100")) pile("tori.100", {placed(Plane{}, {})}, &PhysicsRows::add_tori, false);
-        if (standard_ && (run_.wanted("physics", "collider.edit") || run_.wanted("physics", "collider.main")))
-            collider();
+        if (run_.wanted("physics", "collider.edit") || run_.wanted("physics", "collider.main")) {
+            collider(false);
+            collider(true);
+        }
     }
 
 private:
@@ -218,17 +220,30 @@ private:
         }
     }
 
-    // Bites of 64 cells a side out of the terrain: until the changed ground is what bodies touch, and its bricks there are made.
-    void collider() {
-        run_.stage("collider");
+    // Bites of 64 cells a side out of the terrain: until the changed ground is what bodies touch, and its bricks there are made. Ground that
+    // is meshed where it has settled (`meshed`) is a field again there at once. The peer makes triangles of the same box anew, and the
+    // engine's own collider of them.
+    void collider(bool meshed) {
+        run_.stage(name(meshed ? "collider.meshed" : "collider"));
         std::vector<Edit> edits = terrain(run_.options.seed);
         auto exact = exact_of(edits);
         auto bricks = std::make_shared<const field::BrickField>(
             exact, field::BrickFieldOptions{.voxel_size = kVoxel, .near = 4 * kVoxel});
         auto made = make_world(engine_, {});
         if (!made) return run_.fail(made.error());
-        const auto ground = (*made)->add({.shape = SdfShape::fixed(exact, bricks), .motion = Motion::Static});
+        World& world = **made;
+        const auto ground = world.add(
+            {.shape = SdfShape::fixed(exact, bricks), .motion = Motion::Static, .mesh_voxel = meshed ? kVoxel : 0});
         if (!ground) return run_.fail(ground.error());
+        // Somebody in each region, who keeps it meshed.
+        constexpr float kApart = 12;
+        for (float z = -24; meshed && z <= 24; z += kApart)
+            for (float x = -24; x <= 24; x += kApart)
+                if (auto id = world.add({.shape = Convex::box({0.3f, 0.3f, 0.3f}), .pose = {{x, 3, z}, {}}}); !id)
+                    return run_.fail(id.error());
+        const auto settle = [&] {
+            for (int i = 0; meshed && i < 50; ++i) world.step(kStep);
+        };
         const auto touch = [](const field::BrickField& b, const Box3& box) {
             double sum = 0;
             const float step = kVoxel * field::kBrickVoxels;
@@ -238,9 +253,10 @@ private:
             return sum;
         };
         (void)touch(*bricks, {{-kSide / 2, -2, -kSide / 2}, {kSide / 2, 2, kSide / 2}});
-        double whole = 1e300, share = 1e300;
+        double whole = 1e300, share = 1e300, peer = 1e300;
         uint64_t hash = 0, slow = 0;
-        for (int i = 0; i < kEdits; ++i) {
+        for (int i = 0; i < (meshed ? kMeshedEdits : kEdits); ++i) {
+            settle();
             const float half = 0.5f * kEditCells * kVoxel;
             const vec3 at{kSide * 0.6f * (uniform(7, uint32_t(i), 0) - 0.5f), 0,
                           kSide * 0.6f * (uniform(7, uint32_t(i), 1) - 0.5f)};
@@ -252,28 +268,52 @@ private:
                 const std::shared_ptr<const field::BrickField> before = bricks;
                 main = seconds_of([&] {
                     bricks = before->after(exact, box);
-                    (*made)->set_field(*ground, SdfShape::fixed(exact, bricks), box);
+                    world.set_field(*ground, SdfShape::fixed(exact, bricks), box);
                 });
                 (void)touch(*bricks, box);
             });
             whole = std::min(whole, all);
             share = std::min(share, main);
+            peer = std::min(peer, seconds_of([&] { mesh_into(world, exact, box); }));
             const double sum = touch(*bricks, box);
             const double anew = touch(field::BrickField(exact, {.voxel_size = kVoxel, .near = 4 * kVoxel}), box);
             hash = hash_combine(hash, hash64_of(std::span<const double>(&sum, 1)));
             slow = hash_combine(slow, hash64_of(std::span<const double>(&anew, 1)));
         }
-        const auto add = [&](std::string_view row, double seconds) {
+        const auto add = [&](std::string row, double seconds, bool beside) {
             if (!run_.wanted("physics", row)) return;
             BenchRow out;
-            out.name = row;
+            out.name = name(meshed ? row + ".meshed" : row);
             out.value = seconds * 1e3;
             out.unit = "ms";
+            if (beside) {
+                out.peer = formatted("{}, triangles made anew", engine_);
+                out.peer_value = peer * 1e3;
+                out.ratio = out.peer_value / out.value;
+            }
             out.seed = run_.options.seed;
             run_.add_checked(out, hash, slow);
         };
-        add("collider.edit", whole);
-        add("collider.main", share);
+        add("collider.edit", whole, true);
+        add("collider.main", share, false);
+    }
+
+    // Far below, where it touches nothing.
+    void mesh_into(World& world, const std::shared_ptr<const field::ProgramField>& exact, const Box3& box) {
+        const auto shared = std::make_shared<const sdf::Program>(exact->program());
+        const auto host = field::HostBricks::build(shared, {.voxel_size = kVoxel, .bounds = box});
+        if (!host) return run_.fail(host.error());
+        field::Mesh mesh;
+        field::mesh_smooth(field::MeshBricks(*host), mesh);
+        Triangles t;
+        t.vertices.assign(mesh.positions.data(), mesh.positions.data() + mesh.positions.size());
+        t.indices.assign(mesh.triangles.data(), mesh.triangles.data() + mesh.triangles.size());
+        t.solid = SdfShape::fixed(exact);
+        const auto id = world.add({.shape = std::make_shared<const Triangles>(std::move(t)),
+                                   .motion = Motion::Static,
+                                   .pose = {{0, -1000, 0}, {}}});
+        if (!id) return run_.fail(id.error());
+        world.remove(*id);
     }
 
     BenchRun& run_;

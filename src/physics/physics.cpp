@@ -20,6 +20,8 @@ namespace kiln::physics {
 
 namespace {
 
+constexpr float kTouching = 5e-3f;  // metres apart that still counts as lying on something
+
 bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 bool finite(const Pose& p) {
     const quat& q = p.rotation;
@@ -46,7 +48,8 @@ std::optional<Error> fault_of(const BodySettings& s) {
     if (!finite(s.linear_velocity) || !finite(s.angular_velocity))
         return refused("a velocity that is not finite; write finite numbers");
     const auto rate = [](float v) { return std::isfinite(v) && v >= 0; };
-    if (!rate(s.friction) || !rate(s.restitution) || !rate(s.linear_damping) || !rate(s.angular_damping))
+    if (!rate(s.friction) || !rate(s.restitution) || !rate(s.linear_damping) || !rate(s.angular_damping) ||
+        !rate(s.rolling_friction))
         return refused("a friction, restitution or damping that is not a finite number of 0 or more");
     if (s.motion == Motion::Dynamic && !(std::isfinite(s.density) && s.density > 0))
         return refused("a density that is not a finite number above 0");
@@ -130,6 +133,7 @@ Result<BodyId> World::add(const BodySettings& settings) {
         if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     }
     body.last = settings.pose * body.body_from_mass;
+    body.support = {};
     if (settings.mesh_voxel > 0) {
         body.mesher = std::make_unique<GroundMesher>(settings.mesh_voxel, region_builder());
         body.settings.shape = field_ptr(body.settings.shape)->with(body.mesher->regions());
@@ -187,7 +191,7 @@ void World::set_velocity(BodyId id, vec3 linear, vec3 angular) {
 
 Surface World::surface(uint32_t index, vec3 p_world) const {
     const BodySettings& s = bodies_[index].settings;
-    const Surface whole{s.friction, s.restitution};
+    const Surface whole{s.friction, s.restitution, s.rolling_friction};
     const SdfShape* solid = solid_of(s.shape);
     if (s.surfaces.empty() || solid == nullptr) return whole;
     const Pose pose = s.motion == Motion::Static ? s.pose : get(index).pose * inverse(bodies_[index].body_from_mass);
@@ -196,7 +200,8 @@ Surface World::surface(uint32_t index, vec3 p_world) const {
 }
 
 Surface World::of_pair(const Surface& a, const Surface& b) {
-    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution)};
+    return {std::sqrt(a.friction * b.friction), std::max(a.restitution, b.restitution),
+            std::max(a.rolling_friction, b.rolling_friction)};
 }
 
 void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed) {
@@ -211,6 +216,37 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     bodies_[id.index].settings.shape = field;
     swap(id.index, std::move(field));
     wake(changed);
+}
+
+void World::set_shape(BodyId id, std::shared_ptr<const SdfShape> shape) {
+    const Body* was = find(id);
+    KILN_ASSERT(
+        was == nullptr || (was->mesher == nullptr && (shape->moves() || was->settings.motion == Motion::Static)),
+        "body {}", id.index);
+    if (was == nullptr) return;
+    const BodyState now = state(id);
+    const vec3 center = now.pose * was->mass.center;
+    destroy(id.index);
+    Body& b = bodies_[id.index];
+    b.settings.shape = std::move(shape);
+    b.settings.pose = now.pose;
+    b.mass = {};
+    b.body_from_mass = {};
+    if (b.settings.motion != Motion::Static) {
+        b.mass = physics::mass_of(b.settings);
+        b.body_from_mass = {b.mass.center, b.mass.axes};
+        if (b.settings.motion == Motion::Kinematic) b.mass.mass = 0;
+    }
+    b.settings.linear_velocity = now.linear_velocity + cross(now.angular_velocity, now.pose * b.mass.center - center);
+    b.settings.angular_velocity = now.angular_velocity;
+    b.last = now.pose * b.body_from_mass;
+    b.support = {};
+    create(id.index, b);
+}
+
+const BodySettings* World::settings(BodyId id) const {
+    const Body* b = find(id);
+    return b != nullptr ? &b->settings : nullptr;
 }
 
 // Of what is convex and awake: fields meet the ground's field.
@@ -235,9 +271,69 @@ void World::mesh_ground(float seconds) {
     }
 }
 
+// Before the engine moves them: what lay on something in the last step.
+void World::resist_rolling(float seconds) {
+    for (uint32_t i = 0; i < bodies_.size(); ++i) {
+        Body& b = bodies_[i];
+        if (!b.live || b.settings.motion != Motion::Dynamic) continue;
+        const BodyState s = get(i);
+        b.begun = s.linear_velocity;
+        if (s.asleep || !(b.support.rolling_friction > 0)) continue;
+        const Velocities now = physics::resist_rolling(b.mass, s.pose, {s.linear_velocity, s.angular_velocity},
+                                                       b.support, gravity_, seconds);
+        b.begun = now.linear;
+        guide(i, now.linear, now.angular);
+    }
+}
+
+// What holds each body up where rolling is resisted, and how hard it did so in this step.
+void World::find_supports(float seconds) {
+    for (Body& b : bodies_) b.support = {};
+    const auto rolls = [](const Body& b) {
+        return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
+                                                              [](const Surface& s) { return s.rolling_friction > 0; });
+    };
+    std::vector<uint32_t> weights(bodies_.size());
+    for (const Pair& p : pairs_) {
+        if (p.depth < -kTouching || (!rolls(bodies_[p.a]) && !rolls(bodies_[p.b]))) continue;
+        const float friction = of_pair(surface(p.a, p.point), surface(p.b, p.point)).rolling_friction;
+        for (const bool first : {true, false}) {
+            const uint32_t on = first ? p.a : p.b, under = first ? p.b : p.a;
+            Body& b = bodies_[on];
+            if (b.settings.motion != Motion::Dynamic) continue;
+            Support& s = b.support;
+            ++weights[on];
+            s.point = s.point + p.point;
+            s.normal = first ? s.normal + p.normal : s.normal - p.normal;
+            s.rolling_friction = std::max(s.rolling_friction, friction);
+            if (bodies_[under].settings.motion == Motion::Static) continue;
+            const BodyState below = get(under);
+            s.spin = s.spin + below.angular_velocity;
+            s.velocity =
+                s.velocity + below.linear_velocity + cross(below.angular_velocity, p.point - below.pose.position);
+        }
+    }
+    for (uint32_t i = 0; i < bodies_.size(); ++i) {
+        Body& b = bodies_[i];
+        if (weights[i] == 0) continue;
+        const float share = 1 / float(weights[i]), up = length(b.support.normal);
+        Support& s = b.support;
+        if (!(up > 0)) {
+            s = {};
+            continue;
+        }
+        s.point = s.point * share, s.spin = s.spin * share, s.velocity = s.velocity * share;
+        s.normal = s.normal / up;
+        const float kept = std::exp(-b.settings.linear_damping * seconds);
+        const vec3 gained = get(i).linear_velocity - (b.begun + gravity_ * seconds) * kept;
+        s.impulse = std::max(dot(gained, s.normal), 0.0f) * float(b.mass.mass);
+    }
+}
+
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
     mesh_ground(seconds);
+    resist_rolling(seconds);
     advance(seconds);
     for (uint32_t i = 0; i < bodies_.size(); ++i) {
         if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;
@@ -262,6 +358,7 @@ void World::step(float seconds) {
     collect(pairs_);
     std::sort(pairs_.begin(), pairs_.end(),
               [](const Pair& p, const Pair& q) { return std::tie(p.a, p.b, q.depth) < std::tie(q.a, q.b, p.depth); });
+    find_supports(seconds);
     events_.clear();
     std::vector<Touch>& touches = touches_before_;  // what is of no more use
     touches.clear();

@@ -3,12 +3,14 @@
 // contact threads, margins, sleeping rules. Metres, kilograms, seconds; +Y up.
 //
 // A body's frame is the caller's: its position and rotation are of that frame, velocities are of its centre of mass. Friction of a
-// pair is the geometric mean, restitution the larger of the two. Damping is a rate: velocity falls as exp(-damping · t).
+// pair is the geometric mean, restitution and rolling friction (rolling.h) the larger of the two. Damping is a rate: velocity falls as
+// exp(-damping · t). A body sleeps, on every engine, with all that it hangs together with, when each has kept its place for kStillSeconds.
 #pragma once
 
 #include "physics/convex.h"
 #include "physics/ground_mesher.h"
 #include "physics/pose.h"
+#include "physics/rolling.h"
 #include "physics/sdf_shape.h"
 
 #include <kiln/edit.h>
@@ -42,7 +44,7 @@ using BodyShape = std::variant<Convex, std::shared_ptr<const SdfShape>, std::sha
 const SdfShape* solid_of(const BodyShape& shape);
 
 struct Surface {
-    float friction = 0.5f, restitution = 0;
+    float friction = 0.5f, restitution = 0, rolling_friction = 0;
 };
 
 struct BodySettings {
@@ -58,6 +60,8 @@ struct BodySettings {
     /// Of static fields, metres: what is convex touches triangles of voxels of this size where the ground has settled (ground_mesher.h);
     /// 0: the field everywhere.
     float mesh_voxel = 0;
+    /// Tangent of the slope on which a ball begins to roll; elsewhere it takes 5/7 of that times the load from a rolling ball.
+    float rolling_friction = 0;
 };
 
 struct BodyState {
@@ -92,13 +96,19 @@ struct WorldSettings {
     int threads = 1;  ///< engines that have no threads of their own use one
 };
 
+/// How long a body keeps its place, within kStillPlace and kStillTurn, before it sleeps.
+inline constexpr float kStillSeconds = 1.5f, kStillPlace = 0.02f, kStillTurn = 0.03f;
+
 /// A set of bodies. Everything is the owner's thread, except that the questions may be asked from any thread between steps.
 /// Same input, same bytes, for any number of threads within one engine.
 class World {
 public:
     static constexpr uint32_t kMostBodies = 1u << 16;
 
+    explicit World(vec3 gravity) : gravity_(gravity) {}
     virtual ~World() = default;
+    World(const World&) = delete;
+    World& operator=(const World&) = delete;
     virtual std::string_view backend() const = 0;
 
     /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move.
@@ -115,6 +125,12 @@ public:
     /// Another field for a static body that has one, as edits make it. `changed` holds where in the world the two differ: what lies there
     /// wakes, and falls, or is pushed out, with the next step.
     void set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Box3& changed);
+
+    /// Another shape for a body, as cutting and building make it: mass, centre and moments are the new one's, and each of its points keeps
+    /// its velocity. What touched it wakes.
+    void set_shape(BodyId id, std::shared_ptr<const SdfShape> shape);
+    /// As it was added, or changed since; null for none.
+    const BodySettings* settings(BodyId id) const;
 
     /// Gravity acts, then contacts, then the bodies move, by `seconds` > 0. A body whose state is not finite afterwards goes back to where
     /// it was and rests; lost() counts them.
@@ -155,6 +171,8 @@ protected:
         MassProperties mass;  // zero for what does not move by itself
         Pose body_from_mass;  // centre of mass and principal axes
         Pose last;            // where it was last known to be, of its mass
+        Support support;      // of the last step
+        vec3 begun{};         // linear velocity with which it began the step
         std::unique_ptr<GroundMesher> mesher;
         uint32_t generation = 0;
         bool live = false;
@@ -171,6 +189,8 @@ protected:
     virtual BodyState get(uint32_t index) const = 0;
     virtual void put(uint32_t index, const Pose& pose) = 0;
     virtual void push(uint32_t index, vec3 linear, vec3 angular) = 0;
+    /// The same without waking it, or keeping it awake.
+    virtual void guide(uint32_t index, vec3 linear, vec3 angular) = 0;
     virtual void swap(uint32_t index, std::shared_ptr<const SdfShape> field) = 0;
     virtual void advance(float seconds) = 0;
     virtual GroundMesher::Build region_builder() const = 0;
@@ -178,6 +198,7 @@ protected:
     struct Pair {
         uint32_t a, b;
         float depth;
+        vec3 point{}, normal{};  // mean of where they touch; unit, from b to a
     };
     virtual void collect(std::vector<Pair>& pairs) const = 0;
     /// Bodies whose box meets this one, in any order.
@@ -186,6 +207,9 @@ protected:
 private:
     const MassProperties& mass_of(BodyId id) const;
     void mesh_ground(float seconds);
+    void resist_rolling(float seconds);
+    void find_supports(float seconds);
+    vec3 gravity_{};
     template <typename Ask>
     auto ask(uint32_t index, Ask&& ask_field) const;
     template <typename Ask>

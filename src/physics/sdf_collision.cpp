@@ -222,9 +222,6 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
     }
 }
 
-namespace {
-
-// Contacts that were found on interpolated values, as the exact field has them. Those farther apart than the margin go.
 void measure(const SdfShape& shape, float margin, std::vector<FieldContact>& contacts) {
     std::array<vec3, kMostContacts> p, g;
     std::array<float, kMostContacts> d;
@@ -238,8 +235,6 @@ void measure(const SdfShape& shape, float margin, std::vector<FieldContact>& con
     }
     std::erase_if(contacts, [&](const FieldContact& c) { return !(c.depth > -margin); });
 }
-
-}  // namespace
 
 void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_body, float margin,
              std::vector<FieldContact>& out) {

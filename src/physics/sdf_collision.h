@@ -39,6 +39,10 @@ void collide(const field::SdfField& field, const Convex& body, const Pose& field
 void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_body, float margin,
              std::vector<FieldContact>& out);
 
+/// Contacts that were found on interpolated values, or on triangles, as the exact field has them; kMostContacts at most. Those farther apart
+/// than the margin go.
+void measure(const SdfShape& shape, float margin, std::vector<FieldContact>& contacts);
+
 /// Of two shapes with surface points (a world without them may be `b`): in b's frame, points on a's surface for contacts from a's
 /// points and on b's for b's; normals out of b's solid. At most kMostContacts, no two at one place.
 void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float margin, std::vector<FieldContact>& out);

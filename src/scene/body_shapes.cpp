@@ -47,12 +47,13 @@ std::optional<physics::Convex> convex_of(std::span<const Edit> edits) {
 }
 
 std::vector<physics::Surface> surfaces_of(const SceneData& data) {
-    std::vector<physics::Surface> out{{data.physics.friction, data.physics.restitution}};
+    std::vector<physics::Surface> out{{data.physics.friction, data.physics.restitution, data.physics.rolling_friction}};
     for (size_t i = 0; i < data.materials.size(); ++i) {
         const SceneData::Silent silent = i < data.silent.size() ? data.silent[i] : SceneData::Silent{};
         const Material& m = data.materials[i].second;
         out.push_back({silent.friction ? data.physics.friction : m.friction,
-                       silent.restitution ? data.physics.restitution : m.restitution});
+                       silent.restitution ? data.physics.restitution : m.restitution,
+                       silent.rolling_friction ? data.physics.rolling_friction : m.rolling_friction});
     }
     if (out.size() == 1) out.clear();
     return out;

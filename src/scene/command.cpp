@@ -25,13 +25,13 @@ public:
         return std::move(out_);
     }
     std::optional<Error> fault(JsonIndex at) {
-        if (!kind_of(at)) return std::move(in_.error);
+        if (!kind_of(at, true)) return std::move(in_.error);
         return std::nullopt;
     }
 
 private:
-    // Which command, and its other keys.
-    bool kind_of(JsonIndex at) {
+    // Which command, and its other keys. Where bodies run an edit may have a target (simulation_bodies.cpp), which no world sees.
+    bool kind_of(JsonIndex at, bool of_play = false) {
         if (!doc_.is(at, JsonType::Object)) return in_.wrong_type(at, "a command such as {\"remove\": \"lump\"}");
         const JsonIndex what = doc_.first(at);
         if (what == doc_.next(at)) return in_.fail(at, "an empty command; write for example {\"remove\": \"lump\"}");
@@ -44,7 +44,10 @@ private:
         for (JsonIndex c = doc_.next(what); c < doc_.next(at); c = doc_.next(c)) {
             const bool names_edit =
                 (ordered && doc_.key(c) == "before") || (out_.kind == CommandKind::Change && doc_.key(c) == "was");
-            if (!names_edit) {
+            const bool target = doc_.key(c) == "target" && out_.kind == CommandKind::Add;
+            if (target && !of_play)
+                return in_.fail_at_key(c, "only edits that are added while bodies run have a target");
+            if (!names_edit && !target) {
                 return in_.fail_at_key(c, ordered ? formatted("unknown key; {} may have \"before\"", kKeys[kind])
                                           : out_.kind == CommandKind::Change ? "unknown key; change may have \"was\""
                                                                              : "unknown key; a command has one");

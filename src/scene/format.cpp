@@ -79,6 +79,8 @@ constexpr KeyRow kMaterialRows[] = {
            "0: nothing is lost inside"),
     number("friction", KILN_AT(Material, friction), 0.5f, "1", ">= 0", "of bodies that touch it"),
     number("restitution", KILN_AT(Material, restitution), 0, "1", "[0, 1]", "bounce: 1 loses nothing"),
+    number("rolling_friction", KILN_AT(Material, rolling_friction), 0, "1", ">= 0",
+           "tangent of the slope on which a ball begins to roll: sand 0.3, rock 0.05, steel 0.001"),
 };
 
 constexpr KeyRow kOutlineRows[] = {
@@ -167,6 +169,8 @@ constexpr KeyRow kPhysicsRows[] = {
     number("step", KILN_AT(ScenePhysics, step), 0.0166666667f, "s", "(0, 1]", "fixed time step"),
     number("friction", KILN_AT(ScenePhysics, friction), 0.5f, "1", ">= 0", "of the world where no material says"),
     number("restitution", KILN_AT(ScenePhysics, restitution), 0, "1", "[0, 1]", "of the world where no material says"),
+    number("rolling_friction", KILN_AT(ScenePhysics, rolling_friction), 0, "1", ">= 0",
+           "of the world where no material says"),
 };
 constexpr KeyRow kBodyRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
@@ -185,6 +189,7 @@ constexpr KeyRow kBodyRows[] = {
             "at the start, of the centre of mass"),
     numbers("angular_velocity", 3, KILN_AT(SceneBody::Numbers, angular_velocity), {0, 0, 0}, "rad/s", "any",
             "at the start"),
+    number("rolling_friction", KILN_AT(SceneBody::Numbers, rolling_friction), 0, "1", ">= 0", "of its surface"),
 };
 constexpr KeyRow kTriggerRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),

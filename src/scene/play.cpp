@@ -59,7 +59,7 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
     const auto world = live();
     if (!world) return world.error();
     for (const Member& m : members_) {
-        const auto edit = m.edit.empty() ? std::nullopt : (*world)->find_edit(m.edit);
+        const auto edit = m.edit.empty() || m.gone ? std::nullopt : (*world)->find_edit(m.edit);
         if (!edit) continue;
         if (auto moved = (*world)->move(*edit, blend(m.before, state(m).pose, between)); !moved) return moved.error();
     }
@@ -74,9 +74,16 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
     move_meshes(*frame, between);
     frame->time = time() - (1 - double(between)) * step_seconds();
     frame->time_before = std::exchange(time_shown_, frame->time);
+    for (const Crumb& c : crumbs_)
+        frame->particles.push_back({.position = blend({c.before, {}}, {c.position, {}}, between).position,
+                                    .before = c.before,
+                                    .radius = c.radius,
+                                    .color = c.color,
+                                    .opacity = 1});
     std::vector<physics::BodyId> outlined;
     for (const Member& m : members_)
-        if (!m.rest && (shown.shapes || (shown.sleeping && world_->state(m.body).asleep))) outlined.push_back(m.body);
+        if (!m.rest && !m.gone && (shown.shapes || (shown.sleeping && world_->state(m.body).asleep)))
+            outlined.push_back(m.body);
     for (const Walker& w : walkers_)
         if (shown.shapes) outlined.push_back(w.character.body());
     for (const physics::Line& line : physics::lines(*world_, outlined, {.contacts = false}))
@@ -89,6 +96,42 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
 
 }  // namespace scene
 
+// A world that is edited while a copy of it, as it was at the beginning, is played.
+struct Play::Session {
+    Session(World& edited, World copy) : world(&edited), start(std::move(copy)), from(edited.history().now()) {}
+    Session(const Session&) = delete;
+    Session& operator=(const Session&) = delete;
+    ~Session() { (void)stop(); }
+
+    // Commands that it has not taken yet.
+    Result<void> tell(const scene::Simulation& simulation) {
+        for (; taken < simulation.made().size(); ++taken)
+            if (auto done = world->apply(simulation.made()[taken], "play"); !done) return done;
+        return {};
+    }
+    Result<void> stop() {
+        if (!open) return {};
+        History history = world->history();
+        if (auto done = history.end_group(); !done) return done;
+        open = false;
+        return history.now() == from ? Result<void>() : history.go_to(from);
+    }
+    Result<void> keep(const scene::Simulation& simulation) {
+        if (!open) return Error{"playing: it has ended already; begin another", ErrorKind::Usage};
+        if (auto done = tell(simulation); !done) return done;
+        if (auto done = simulation.keep_poses(*world); !done) return done;
+        if (auto done = world->history().end_group(); !done) return done;
+        open = false;
+        return {};
+    }
+
+    World* world;
+    World start;
+    uint32_t from;
+    size_t taken = 0;
+    bool open = true;
+};
+
 Play::Play(std::unique_ptr<scene::Simulation> simulation) : simulation_(std::move(simulation)) {}
 Play::Play(Play&&) noexcept = default;
 Play& Play::operator=(Play&&) noexcept = default;
@@ -100,9 +143,39 @@ Result<Play> Play::start(const World& world, const SimulateSettings& settings) {
     return Play(std::move(*made));
 }
 
+Result<Play> Play::begin(World& world, const SimulateSettings& settings) {
+    const scene::SceneData& data = world.impl_->data;
+    // Bundled models are known by the scene's name.
+    auto copy = World::parse(world.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
+    if (!copy) return copy.error();
+    auto session = std::make_unique<Session>(world, std::move(*copy));
+    auto made = scene::Simulation::make(session->start, settings);
+    if (!made) {
+        session->open = false;
+        return made.error();
+    }
+    world.history().begin_group("play");
+    Play out(std::move(*made));
+    out.session_ = std::move(session);
+    return out;
+}
+
+Result<void> Play::tell() { return session_ && session_->open ? session_->tell(*simulation_) : Result<void>(); }
+
+Result<void> Play::stop() {
+    if (!session_) return Error{"playing: only what begin() began is stopped", ErrorKind::Usage};
+    return session_->stop();
+}
+
+Result<void> Play::keep() {
+    if (!session_) return Error{"playing: say which world keeps it, or begin() with one", ErrorKind::Usage};
+    return session_->keep(*simulation_);
+}
+
 Result<void> Play::step() {
     between_ = 1;
-    return simulation_->step();
+    if (auto done = simulation_->step(); !done) return done;
+    return tell();
 }
 
 Result<int> Play::advance(double seconds) {
@@ -113,6 +186,7 @@ Result<int> Play::advance(double seconds) {
     int made = 0;
     for (; made < kMostSteps && ahead_ >= step; ++made, ahead_ -= step)
         if (auto done = simulation_->step(); !done) return done.error();
+    if (auto done = tell(); !done) return done.error();
     if (ahead_ >= step) {
         const double left = std::fmod(ahead_, step);
         dropped_ += ahead_ - left;
@@ -125,7 +199,8 @@ Result<int> Play::advance(double seconds) {
 double Play::time() const { return simulation_->time(); }
 
 Result<void> Play::apply(const std::string& command, const std::string& name) {
-    return simulation_->command_now(command, name);
+    if (auto done = simulation_->command_now(command, name); !done) return done;
+    return tell();
 }
 
 Result<void> Play::keep(World& world) const { return simulation_->keep(world); }

@@ -97,7 +97,8 @@ private:
             Material m;
             if (!in_.table(c, kMaterialTable, &m.base_color.x)) return false;
             scene_.materials.emplace_back(doc_.key(c), m);
-            scene_.silent.push_back({!doc_.find(c, "friction"), !doc_.find(c, "restitution")});
+            scene_.silent.push_back(
+                {!doc_.find(c, "friction"), !doc_.find(c, "restitution"), !doc_.find(c, "rolling_friction")});
         }
         if (scene_.materials.size() > 60000)
             return in_.fail(*at, formatted("{} materials; at most 60000", scene_.materials.size()));

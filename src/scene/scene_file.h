@@ -24,11 +24,11 @@ struct TextHash {
 };
 using NameNumbers = std::unordered_map<std::string, uint32_t, TextHash, std::equal_to<>>;
 
-/// Section "physics". Friction and restitution are those of the world's surface.
+/// Section "physics". Frictions and restitution are those of the world's surface.
 struct ScenePhysics {
     vec3 gravity{0, -9.81f, 0};
     float step = 0.0166666667f;  ///< seconds
-    float friction = 0.5f, restitution = 0;
+    float friction = 0.5f, restitution = 0, rolling_friction = 0;
 };
 
 /// An entry of "bodies".
@@ -36,6 +36,7 @@ struct SceneBody {
     struct Numbers {
         float density = 1000, friction = 0.5f, restitution = 0, linear_damping = 0, angular_damping = 0;
         vec3 linear_velocity{}, angular_velocity{};
+        float rolling_friction = 0;
     };
     enum class Motion : uint8_t { Static, Kinematic, Dynamic };
     std::string id;
@@ -100,7 +101,7 @@ struct SceneData {
     std::vector<std::pair<std::string, Material>> materials;  ///< MaterialId::index refers here
     /// By material: what its file says nothing of, so that the scene's own counts. Those added later say everything.
     struct Silent {
-        bool friction = false, restitution = false;
+        bool friction = false, restitution = false, rolling_friction = false;
     };
     std::vector<Silent> silent;
     std::vector<Object> objects;  ///< ObjectId::index refers here

@@ -66,6 +66,7 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings,
         frames.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("bodies").raw("[");
         const char* between = "";
         for (const scene::Simulation::Member& m : simulation.members()) {
+            if (m.gone) continue;
             const physics::BodyState state = simulation.state(m);
             frames.raw(between).raw("\n    {").key("id").quoted(m.id).raw(", ");
             frames.key("position").vector(state.pose.position).raw(", ");
@@ -119,7 +120,8 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings,
     Text text;
     text.raw("{").key("backend").quoted(world.backend()).raw(",\n").key("bodies").raw("[").raw(bodies.out);
     text.raw("],\n").key("frames").raw("[").raw(frames.out);
-    text.raw("],\n").key("events").raw("[").raw(events.out).raw("]}\n");
+    text.raw("],\n").key("crumbs").number(double(simulation.crumbs()));
+    text.raw(",\n").key("events").raw("[").raw(events.out).raw("]}\n");
     return std::move(text.out);
 }
 

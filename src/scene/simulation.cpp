@@ -3,6 +3,10 @@
 #include "scene/simulation.h"
 
 #include "scene/body_shapes.h"
+#include "scene/command.h"
+
+#include "model/topology.h"
+#include "physics/mesh_mass.h"
 
 #include "base/format.h"
 
@@ -21,11 +25,14 @@ constexpr const char* kWorldName = "world";
 constexpr int kMeshResolution = 64;  // cells along the longest side of a body's mesh
 constexpr const char* kBodysOwn = "is a body's; commands change the world's own edits while bodies run";
 
-// The command of a line of timed ones, as it is written there.
+// The command of a line of timed ones, as it is written there; or the command itself.
 std::string command_in(const std::string& line) {
     const auto doc = JsonDocument::parse(line, "command");
-    const auto at = doc ? doc->find(0, "command") : std::nullopt;
-    return at ? std::string(doc->source(*at)) : std::string();
+    const auto at = doc && doc->is(0, JsonType::Object) ? doc->find(0, "command") : std::nullopt;
+    if (!at) return line;
+    JsonDocument out;
+    out.add_copy(*doc, *at);
+    return out.line();
 }
 
 }  // namespace
@@ -68,7 +75,7 @@ Result<void> Simulation::add(const physics::BodySettings& body, std::string_view
     physics::MassProperties mass;
     mass.mass = world_->mass(*id);
     mass.center = world_->center_of_mass(*id);
-    members_.push_back({.id = std::string(name), .body = *id, .mass = mass, .before = body.pose});
+    members_.push_back({.id = std::string(name), .body = *id, .mass = mass, .before = body.pose, .began = body.pose});
     names_.emplace(*id, name);
     return {};
 }
@@ -95,7 +102,8 @@ Result<void> Simulation::set_ground(const Box3& changed) {
                       .friction = data.physics.friction,
                       .restitution = data.physics.restitution,
                       .surfaces = surfaces_of(data),
-                      .mesh_voxel = mesh_voxel_},
+                      .mesh_voxel = mesh_voxel_,
+                      .rolling_friction = data.physics.rolling_friction},
                      kWorldName);
     if (!added) return added;
     ground_body_ = members_.back().body;
@@ -130,7 +138,8 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
                                 .angular_damping = body.numbers.angular_damping,
                                 .continuous = body.continuous,
                                 .linear_velocity = body.numbers.linear_velocity,
-                                .angular_velocity = body.numbers.angular_velocity};
+                                .angular_velocity = body.numbers.angular_velocity,
+                                .rolling_friction = body.numbers.rolling_friction};
         if (const auto convex = settings.field_bodies ? std::nullopt : convex_of(edits)) {
             s.shape = *convex;
         } else {
@@ -146,9 +155,13 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
                 auto shape = physics::SdfShape::moving(std::move(*field), std::move(bricks));
                 if (!shape) return wrong(shape.error().message);
                 s.shape = std::move(*shape);
+                // What a mesh bounds once has the mass that its triangles say, more exactly than a grid does.
+                if (const auto mass = body.mesh.empty() ? std::nullopt : exact_mass(edits.front()))
+                    s.shape = std::get<std::shared_ptr<const physics::SdfShape>>(s.shape)->with(*mass);
             }
         }
         if (auto added = add(s, body.id); !added) return wrong(added.error().message);
+        members_.back().edits = std::move(edits);
         if (!body.edits.empty()) members_.back().edit = body.edits.front();
     }
     return {};
@@ -178,6 +191,26 @@ Result<void> Simulation::check_closed(const SceneBody& body, const Edit& edit) c
     return Error{formatted("its mesh \"{}\" is not closed ({}); close it, or make the motion \"static\"",
                            edit.node.shape.data, report.sentence()),
                  ErrorKind::Input};
+}
+
+std::optional<physics::MassProperties> Simulation::exact_mass(const Edit& mesh) const {
+    const Grids& grids = start_.impl_->grids;
+    const std::string& file = mesh.node.shape.data;
+    const auto grid = grids.by_mesh.find({file, kMeshResolution});
+    // The sum over triangles would count twice what lies in two parts of the mesh.
+    if (grid == grids.by_mesh.end() || grids.mesh_notes[grid->second].report.overlapping) return std::nullopt;
+    const auto read = model::read(file.starts_with('/') ? file : start_.impl_->data.folder + file);
+    if (!read) return std::nullopt;
+    model::Topology found;
+    const model::Triangles whole = model::heal(*read, found);
+    physics::Triangles triangles;
+    for (const vec3 p : whole.positions) {
+        const vec3 s = mesh.node.transform.scale;
+        triangles.vertices.push_back({p.x * s.x, p.y * s.y, p.z * s.z});
+    }
+    for (const model::Face& f : whole.faces) triangles.indices.insert(triangles.indices.end(), f.begin(), f.end());
+    const auto mass = physics::mass_of_mesh(triangles);
+    return mass ? std::optional(*mass) : std::nullopt;
 }
 
 Result<void> Simulation::add_triggers() {
@@ -214,8 +247,12 @@ std::optional<std::string> Simulation::changed_body() const {
     for (const SceneBody& body : start_.impl_->data.bodies) {
         for (const std::string& name : body.edits) {
             const uint32_t had = before.find(name), has = after.find(name);
+            const auto own = own_.find(name);
+            const Edit* expected = own != own_.end()        ? &own->second
+                                   : had != EditList::kNone ? before[had].edit.get()
+                                                            : nullptr;
             const bool same =
-                had == EditList::kNone ? has == had : has != EditList::kNone && *before[had].edit == *after[has].edit;
+                expected == nullptr ? has == EditList::kNone : has != EditList::kNone && *expected == *after[has].edit;
             if (!same) return name;
         }
     }
@@ -226,32 +263,52 @@ std::optional<std::string> Simulation::changed_body() const {
     return std::nullopt;
 }
 
-Result<void> Simulation::command_now(const std::string& command, const std::string& name) {
-    const auto world = live();
-    if (!world) return world.error();
-    History history = (*world)->history();
-    if (auto applied = (*world)->apply(command, name); !applied) return applied;
-    const auto body = changed_body();
-    if (!body) {
-        changed_ = true;
-        made_.push_back(command);
-        return {};
+// Refused, it changes nothing.
+Result<void> Simulation::obey(const std::string& text, const std::string& name,
+                              const std::function<Result<void>(World&, const std::string&)>& apply) {
+    if (auto there = live(); !there) return there.error();
+    const auto aimed = aim(text, name);
+    if (!aimed) return aimed.error();
+    std::vector<Recut> cuts;
+    const bool of_world = aimed->target.empty() || aimed->target == "world" || aimed->target == "all";
+    const std::string bare = command_in(aimed->text);
+    if (!aimed->target.empty() && aimed->target != "world") {
+        auto command = read_command(bare, name, live_->impl_->names());
+        if (!command) return command.error();
+        auto found = recut(*command->edit, aimed->target, name);
+        if (!found) return found.error();
+        cuts = std::move(*found);
     }
-    if (const auto undone = history.undo(); !undone) return undone.error();
-    return Error{formatted("{}: \"{}\" {}", name, *body, kBodysOwn), ErrorKind::Input};
+    if (of_world) {
+        History history = live_->history();
+        if (auto applied = apply(*live_, aimed->text); !applied) return applied;
+        if (const auto body = changed_body()) {
+            if (const auto undone = history.undo(); !undone) return undone.error();
+            return Error{formatted("{}: \"{}\" {}", name, *body, kBodysOwn), ErrorKind::Input};
+        }
+        changed_ = true;
+        made_.push_back(bare);
+    }
+    for (Recut& cut : cuts)
+        if (auto done = reshape(std::move(cut)); !done) return done;
+    return {};
+}
+
+Result<void> Simulation::command_now(const std::string& command, const std::string& name) {
+    return obey(command, name, [&](World& world, const std::string& text) { return world.apply(text, name); });
 }
 
 Result<void> Simulation::apply_commands() {
     const double now = time();
     for (; done_ < commands_.size() && commands_[done_].time <= now + 1e-9; ++done_) {
-        const auto world = live();
-        if (!world) return world.error();
         const TimedCommand& command = commands_[done_];
-        if (auto applied = (*world)->apply(command); !applied) return applied;
-        changed_ = true;
-        if (const auto body = changed_body())
-            return Error{formatted("{}:{}: \"{}\" {}", command.file, command.line, *body, kBodysOwn), ErrorKind::Input};
-        made_.push_back(command_in(command.text));
+        auto done = obey(command.text, formatted("{}:{}", command.file, command.line),
+                         [&](World& world, const std::string& text) {
+                             TimedCommand bare = command;
+                             bare.text = text;
+                             return world.apply(bare);
+                         });
+        if (!done) return done;
     }
     return std::exchange(changed_, false) ? change_ground() : Result<void>();
 }
@@ -259,7 +316,9 @@ Result<void> Simulation::apply_commands() {
 Result<void> Simulation::step() {
     if (auto done = apply_commands(); !done) return done;
     if (auto done = settle_parts(); !done) return done;
-    for (Member& m : members_) m.before = state(m).pose;
+    for (Member& m : members_)
+        if (!m.gone) m.before = state(m).pose;
+    drop_crumbs();
     walk();
     world_->step(seconds_);
     ++steps_;

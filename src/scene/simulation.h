@@ -13,9 +13,11 @@
 
 #include <kiln/world.h>
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <unordered_set>
 #include <vector>
@@ -31,8 +33,15 @@ public:
     Result<void> step();
     /// A command, {"add": EDIT} and the like, whose change comes before the next step; refused, it changes nothing.
     Result<void> command_now(const std::string& command, const std::string& name);
-    /// Makes another world, as it was at the start, what this one has become: commands, what came loose, and where that is. One step.
+    /// Makes another world, as it was at the start, what this one has become: commands, what came loose, and where that is and bodies are.
+    /// One step.
     Result<void> keep(World& world) const;
+    /// The commands that have led from the start to the ground and the parts of now, in order; it grows.
+    const std::vector<std::string>& made() const { return made_; }
+    /// Puts what moves in a world that has taken all of them where it is.
+    Result<void> keep_poses(World& world) const;
+    /// Parts too small to be bodies that have come loose; pictures show them fall.
+    int crumbs() const { return crumb_count_; }
     /// The world with its bodies between where they were before the last step (0) and where they are (1).
     Result<Frame> frame(const Camera& camera, float between, const PlayLines& lines, const FrameBudget& budget = {});
 
@@ -54,7 +63,11 @@ public:
         std::string edit{};      ///< by which the live world moves it; empty: by none
         physics::Pose before{};  ///< the last step
         std::optional<physics::BodyState>
-            rest{};  ///< of a part that has settled back into the world: it is no body any more
+            rest{};                 ///< of a part that has settled back into the world: it is no body any more
+        std::vector<Edit> edits{};  ///< its shape, in its frame
+        physics::Pose began{};      ///< the pose at which the world has its edits
+        bool gone = false;          ///< nothing is left of it
+        int cuts = 0;               ///< objects that it was given
     };
     const std::vector<Member>& members() const { return members_; }
     physics::BodyState state(const Member& m) const { return m.rest ? *m.rest : world_->state(m.body); }
@@ -94,8 +107,50 @@ private:
     std::optional<std::string> changed_body() const;
     Result<void> apply_commands();
     Result<void> change_ground();
-    /// Makes a part of the ground a body; nothing where it has no volume.
-    Result<bool> cut_loose(const field::LoosePart& part);
+    /// Where a part is cut from: the list of what is around it, and how that moves.
+    struct Source {
+        std::span<const Edit* const> edits;
+        physics::Pose frame{};
+        vec3 velocity{}, spin{}, about{};  // of the place `about`, world
+        physics::BodyId body{};            // none: the ground
+    };
+    /// Makes it a body; nothing where it has no volume.
+    Result<bool> cut_loose(const field::LoosePart& part, const Source& from);
+    /// Takes its region from the ground.
+    Result<void> cut_from_ground(const field::LoosePart& part, const std::string& name);
+
+    // Edits that act on bodies (simulation_bodies.cpp).
+    struct Aimed {
+        std::string text, target;  // the command without its target; empty: the world
+    };
+    static Result<Aimed> aim(const std::string& text, const std::string& name);
+    struct Recut {
+        size_t member = 0;
+        std::vector<Edit> edits{};
+        std::shared_ptr<const field::ProgramField> before{}, after{};
+        Box3 changed{};  // in its frame
+    };
+    Result<std::vector<Recut>> recut(const Edit& edit, const std::string& target, const std::string& name);
+    Result<Recut> recut(size_t member, const Edit& edit);
+    Result<void> reshape(Recut cut);
+    std::vector<std::string> edits_of(const Member& m) const;
+    Result<void> change_own(const std::string& name, const Edit& edit);
+    Result<void> hide(const Member& m);
+    Result<void> show(Member& m);
+    /// A command for the world, for bodies or for both; `apply` gives the world its part.
+    Result<void> obey(const std::string& text, const std::string& name,
+                      const std::function<Result<void>(World&, const std::string&)>& apply);
+
+    struct Crumb {
+        vec3 position, before, velocity;
+        float radius;
+        vec3 color;
+        int64_t since;
+    };
+    static constexpr size_t kCrumbPoints = 8;  // parts of fewer lattice points are crumbs
+    static constexpr float kCrumbSeconds = 3;  // … and are seen for so long at most
+    void scatter(const field::LoosePart& part, const physics::Pose& frame, uint32_t material);
+    void drop_crumbs();
     Result<void> settle_parts();
     /// A change of the live world, which keep() tells.
     Result<void> change(const CommandView& command);
@@ -103,6 +158,7 @@ private:
     Result<void> set_ground(const Box3& changed);
     std::shared_ptr<const physics::SdfShape> ground_shape(const Box3& changed);
     Result<void> add(const physics::BodySettings& body, std::string_view name);
+    std::optional<physics::MassProperties> exact_mass(const Edit& mesh) const;
     Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
 
     const World& start_;
@@ -141,6 +197,9 @@ private:
     std::optional<World> live_;  // the world as they change it, and as pictures see it; made when it is first needed
     std::vector<Transform> meshes_shown_;  // by SceneData::meshes, in the last frame
     double time_shown_ = 0;
+    std::map<std::string, Edit> own_;  // edits of bodies as cuts have left them
+    std::vector<Crumb> crumbs_;
+    int crumb_count_ = 0;
 };
 
 }  // namespace kiln::scene

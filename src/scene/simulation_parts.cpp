@@ -6,6 +6,7 @@
 // So parts have bricks of their own, look as what they were cut from, and whatever is done to the world later is done to settled ones too.
 
 #include "scene/body_shapes.h"
+#include "scene/part_tree.h"
 #include "scene/region.h"
 #include "scene/simulation.h"
 
@@ -26,75 +27,6 @@ constexpr float kSettleSeconds = 2;   // a part asleep for so long is ground aga
 constexpr float kReachVoxels =
     8;  // edits so near to a region shape the surface in it, or how the part's values go on around it
 
-Node region_node(const field::RegionMask& mask) {
-    Node out;
-    out.shape = SampledMesh{};
-    out.shape.data = region_text(mask);
-    return out;
-}
-
-Box3 box_of(const field::RegionMask& mask) {
-    const auto place = [&](field::ivec3 p) { return vec3{float(p.x), float(p.y), float(p.z)} * mask.voxel_size; };
-    return {place(mask.first), place(mask.first + mask.size)};
-}
-
-// The edits as one tree: a fold for each run of edits that act alike. Leading cuts of nothing are left out.
-std::vector<Node> folded(std::span<const Edit* const> edits) {
-    std::vector<Node> out;  // children first
-    uint32_t top = 0;
-    for (const Edit* e : edits) {
-        if (e->hidden || (out.empty() && e->op != Op::Union)) continue;
-        out.push_back(e->node);
-        const auto leaf = uint32_t(out.size() - 1);
-        if (leaf == 0) continue;
-        Node& before = out[top];
-        if (before.kind == Node::Kind::Fold && before.op == e->op && before.blend_radius == e->blend_radius &&
-            before.material_blend_radius == e->material_blend_radius) {
-            before.children.push_back(leaf);
-            continue;
-        }
-        Node fold;
-        fold.kind = Node::Kind::Fold;
-        fold.op = e->op;
-        fold.blend_radius = e->blend_radius;
-        fold.material_blend_radius = e->material_blend_radius;
-        fold.children = {top, leaf};
-        out.push_back(std::move(fold));
-        top = uint32_t(out.size() - 1);
-    }
-    return out;
-}
-
-// intersect(the edits, the region) in a frame at `origin`, with the root first and children behind their parents.
-Object object_of_part(std::string name, std::span<const Edit* const> edits, const field::RegionMask& region,
-                      vec3 origin) {
-    std::vector<Node> nodes = folded(edits);
-    nodes.push_back(region_node(region));
-    Node root;
-    root.kind = Node::Kind::Fold;
-    root.op = Op::Intersect;
-    root.transform.position = -origin;
-    // The tree's top: the last fold, or the only leaf.
-    const auto last = uint32_t(nodes.size() - 1);
-    uint32_t top = 0;
-    for (uint32_t i = 0; i < last; ++i)
-        if (nodes[i].kind == Node::Kind::Fold) top = i;
-    root.children = {top, last};
-    nodes.push_back(std::move(root));
-    // A fold that grew has children behind it: number anew, by levels from the root.
-    Object out{std::move(name), {}};
-    std::vector<uint32_t> order{uint32_t(nodes.size() - 1)};
-    for (size_t i = 0; i < order.size(); ++i) {
-        Node node = std::move(nodes[order[i]]);
-        for (uint32_t& child : node.children) {
-            order.push_back(child);
-            child = uint32_t(order.size() - 1);
-        }
-        out.nodes.push_back(std::move(node));
-    }
-    return out;
-}
-
 }  // namespace
 
 Result<void> Simulation::change(const CommandView& command) {
@@ -114,32 +46,49 @@ Result<void> Simulation::change_ground() {
     const std::shared_ptr<const field::ProgramField> before = ground_;
     if (auto done = set_ground(*box); !done) return done;
     Box3 cut;
-    for (const field::LoosePart& part : field::loose_parts(*before, *ground_, *box, {.voxel_size = voxel_size_})) {
-        const auto loose = cut_loose(part);
+    const std::vector<field::LoosePart> parts =
+        field::loose_parts(*before, *ground_, *box, {.voxel_size = voxel_size_, .least_points = 1});
+    const sdf::Program& program = ground_->program();
+    for (const field::LoosePart& part : parts) {
+        if (!region_fits(part.region.size)) continue;  // too wide for a region: it stays
+        if (part.points < kCrumbPoints) {
+            scatter(part, {}, ground_->material(part.box.center()));
+            if (auto done = cut_from_ground(part, formatted("crumb{}", crumb_count_)); !done) return done;
+            cut = box_union(cut, box_of(part.region));
+            continue;
+        }
+        std::vector<uint32_t> rows, owners;
+        program.index.find(box_of(part.region), kReachVoxels * voxel_size_, rows);
+        for (const uint32_t row : rows) owners.push_back(program.edits[row].owner);
+        std::sort(owners.begin(), owners.end());
+        std::vector<const Edit*> near;
+        for (const uint32_t owner : owners) near.push_back(&edits_[owner]);
+        const auto loose = cut_loose(part, {.edits = near});
         if (!loose) return loose.error();
-        if (*loose) cut = box_union(cut, box_of(part.region));
+        if (!*loose) continue;
+        cut = box_union(cut, box_of(part.region));
     }
     if (cut.empty()) return {};
     edits_ = ground_of(*live_->impl_, owned_);
     return set_ground(cut);
 }
 
-Result<bool> Simulation::cut_loose(const field::LoosePart& part) {
-    if (!region_fits(part.region.size)) return false;  // too wide for a region: it stays
-    std::vector<uint32_t> rows;
-    const sdf::Program& program = ground_->program();
-    program.index.find(box_of(part.region), kReachVoxels * voxel_size_, rows);
-    std::vector<uint32_t> owners;
-    for (const uint32_t row : rows) owners.push_back(program.edits[row].owner);
-    std::sort(owners.begin(), owners.end());
-    std::vector<const Edit*> near;
-    for (const uint32_t owner : owners) near.push_back(&edits_[owner]);
+Result<void> Simulation::cut_from_ground(const field::LoosePart& part, const std::string& name) {
+    Edit cut;
+    cut.name = name;
+    for (int i = 2; live_->find_edit(cut.name); ++i) cut.name = formatted("{}.{}", name, i);
+    cut.node = region_node(part.region);
+    cut.op = Op::Subtract;
+    return change({.kind = CommandKind::Add, .edit = &cut});
+}
 
+Result<bool> Simulation::cut_loose(const field::LoosePart& part, const Source& from) {
+    if (!region_fits(part.region.size)) return false;  // too wide for a region: it stays
     std::string name;
     do name = formatted("part{}", ++parts_);
     while (live_->find_edit(name) || live_->impl_->data.object_numbers.contains(name));
     const vec3 origin = part.box.center();
-    const Object object = object_of_part(name, near, part.region, origin);
+    const Object object = object_of_part(name, from.edits, part.region, origin);
     if (auto done = change({.kind = CommandKind::Object, .id = name, .object = &object}); !done) return done.error();
     Edit placed;
     placed.name = name;
@@ -151,27 +100,43 @@ Result<bool> Simulation::cut_loose(const field::LoosePart& part) {
     const Box3 own{part.box.min - origin, part.box.max - origin};
     auto shape = physics::SdfShape::moving(*frozen, field::BrickField::of_body(*frozen, voxel_size_));
     const SceneData& data = start_.impl_->data;
-    if (!shape || !add({.shape = std::move(*shape),
-                        .pose = {origin, {}},
-                        .density = kPartDensity,
-                        .friction = data.physics.friction,
-                        .restitution = data.physics.restitution,
-                        .surfaces = surfaces_of(data)},
-                       name)) {
+    const physics::Pose pose = from.frame * physics::Pose{origin, {}};
+    physics::BodySettings settings{.pose = pose,
+                                   .density = kPartDensity,
+                                   .friction = data.physics.friction,
+                                   .restitution = data.physics.restitution,
+                                   .surfaces = surfaces_of(data),
+                                   .rolling_friction = data.physics.rolling_friction};
+    if (const physics::BodySettings* whole = world_->settings(from.body)) {
+        settings.motion = whole->motion;
+        settings.density = whole->density;
+        settings.friction = whole->friction;
+        settings.restitution = whole->restitution;
+        settings.surfaces = whole->surfaces;
+        settings.linear_damping = whole->linear_damping;
+        settings.angular_damping = whole->angular_damping;
+        settings.rolling_friction = whole->rolling_friction;
+    }
+    if (shape) {
+        const vec3 middle = pose * (*shape)->mass().center;
+        settings.shape = std::move(*shape);
+        settings.linear_velocity = from.velocity + cross(from.spin, middle - from.about);
+        settings.angular_velocity = from.spin;
+    }
+    if (!shape || !add(settings, name)) {
         // A crumb too thin to have a volume, or one body too many: it stays.
         --parts_;
         if (auto done = change({.kind = CommandKind::Object, .id = name}); !done) return done.error();
         return false;
     }
-    Edit cut;
-    cut.name = name + ".cut";
-    cut.node = region_node(part.region);
-    cut.op = Op::Subtract;
-    if (auto done = change({.kind = CommandKind::Add, .edit = &cut}); !done) return done.error();
+    if (!from.body)
+        if (auto done = cut_from_ground(part, name + ".cut"); !done) return done.error();
     // A body of the live world, so that it stands apart whatever is dug and built; of worlds that keep it, a dynamic edit.
     owned_.insert(name);
     live_->impl_->data.bodies.push_back({.id = name, .edits = {name}, .mesh = {}, .numbers = {}});
-    placed.node.transform.position = origin;
+    members_.back().edits = {placed};
+    placed.node.transform.position = pose.position;
+    placed.node.transform.rotation = pose.rotation;
     if (auto done = change({.kind = CommandKind::Add, .edit = &placed}); !done) return done.error();
     members_.back().edit = name;
     loose_.push_back({members_.size() - 1, *live_->find(*live_->find_edit(name)), own});
@@ -212,23 +177,36 @@ Result<void> Simulation::settle_parts() {
     return set_ground(changed);
 }
 
+// A body's edits move with its first.
+Result<void> Simulation::keep_poses(World& world) const {
+    const auto put = [&](const Member& m, const std::string& name) -> Result<void> {
+        const auto id = world.find_edit(name);
+        if (!id) return Error{formatted("keep: there is no edit \"{}\"", name), ErrorKind::Usage};
+        const physics::Pose pose = state(m).pose;
+        if (pose == m.began) return {};
+        Edit edit = *world.find(*id);
+        const physics::Pose frame = frame_of(edit);
+        const physics::Pose now = frame == m.began ? pose : pose * inverse(m.began) * frame;
+        edit.node.transform.position = now.position;
+        edit.node.transform.rotation = now.rotation;
+        return world.change(*id, edit);
+    };
+    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
+    for (size_t i = 0; i < bodies.size(); ++i)
+        for (const std::string& name : bodies[i].edits)
+            if (auto done = members_[i].gone ? Result<void>() : put(members_[i], name); !done) return done;
+    for (const Part& part : loose_)
+        if (auto done = put(members_[part.member], members_[part.member].edit); !done) return done;
+    return {};
+}
+
 Result<void> Simulation::keep(World& world) const {
     History history = world.history();
     history.begin_group("play");
     const auto all = [&]() -> Result<void> {
         for (const std::string& command : made_)
             if (auto applied = world.apply(command, "keep"); !applied) return applied;
-        for (const Part& part : loose_) {
-            const Member& m = members_[part.member];
-            const auto id = world.find_edit(m.edit);
-            if (!id) return Error{formatted("keep: there is no edit \"{}\"", m.edit), ErrorKind::Usage};
-            Edit edit = *world.find(*id);
-            const physics::Pose pose = state(m).pose;
-            edit.node.transform.position = pose.position;
-            edit.node.transform.rotation = pose.rotation;
-            if (auto changed = world.change(*id, edit); !changed) return changed;
-        }
-        return {};
+        return keep_poses(world);
     };
     if (auto done = all(); !done) {
         (void)history.cancel_group();

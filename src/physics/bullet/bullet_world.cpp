@@ -17,11 +17,10 @@ namespace kiln::physics {
 
 namespace {
 
-// Half a second below this speed, and a body sleeps: as Jolt has it.
-constexpr float kSleepSeconds = 0.5f, kSleepSpeed = 0.03f;
-// Stacks sway at up to 0.06 m/s here (Jolt's at 0.02). What has kept its place for a while sleeps below a higher speed; what starts to
-// slide, however slowly, has left its place by then.
-constexpr float kStillSeconds = 1.5f, kStillPlace = 0.02f, kStillTurn = 0.03f, kStillSpeed = 0.1f;
+// Bullet asks for speeds below a threshold for a while. The world here says who has kept its place, as Jolt does (what starts to slide,
+// however slowly, has left it), or has been slower than this for a second: a capsule that nothing keeps from rolling. So the while is
+// none, and the threshold is nothing, or more than anything that keeps its place has.
+constexpr float kAtOnce = 1e-6f, kNeverSleeps = 0, kSleeps = 1e3f, kSlow = 0.02f, kSlowSeconds = 1;
 
 // A body moves this share of its inner radius in a step before it is swept, if it is continuous.
 constexpr float kSweepShare = 0.5f;
@@ -40,7 +39,7 @@ bool contact_added(btManifoldPoint& point, const btCollisionObjectWrapper* a, in
 void set_globals() {
     gCalculateCombinedFrictionCallback = geometric_mean;
     gCalculateCombinedRestitutionCallback = larger;
-    gDeactivationTime = kSleepSeconds;
+    gDeactivationTime = kAtOnce;
     gContactAddedCallback = contact_added;
 }
 
@@ -137,7 +136,7 @@ private:
 
 class BulletWorld final : public World {
 public:
-    explicit BulletWorld(const WorldSettings& settings) {
+    explicit BulletWorld(const WorldSettings& settings) : World(settings.gravity) {
         set_globals();
         dynamics_.setGravity(to_bullet(settings.gravity));
         dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
@@ -172,6 +171,7 @@ public:
         std::vector<bool> woken(objects_.size());
         for (const uint32_t i : found) {
             woken[i] = true;
+            stir(*objects_[i]);
             objects_[i]->body->activate(true);
         }
         for (int m = 0; m < dispatcher_.getNumManifolds(); ++m) {
@@ -227,7 +227,7 @@ protected:
         // Gyroscopic torque as Euler's equations have it, integrated implicitly so that thin bodies stay stable.
         object->body->setFlags(object->body->getFlags() | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
         object->anchor = to_pose(at);
-        set_sleep(*object, kSleepSpeed);
+        set_sleep(*object, false);
         objects_[index] = std::move(object);
     }
 
@@ -250,6 +250,7 @@ protected:
         btRigidBody& b = *objects_[index]->body;
         b.setWorldTransform(to_bullet(pose));
         b.setInterpolationWorldTransform(b.getWorldTransform());
+        stir(*objects_[index]);
         if (!b.isStaticObject()) b.activate(true);
         dynamics_.updateSingleAabb(&b);
         if (!b.isStaticObject()) return;
@@ -264,6 +265,11 @@ protected:
         b.setLinearVelocity(to_bullet(linear));
         b.setAngularVelocity(to_bullet(angular));
         b.activate(true);
+    }
+
+    void guide(uint32_t index, vec3 linear, vec3 angular) override {
+        objects_[index]->body->setLinearVelocity(to_bullet(linear));
+        objects_[index]->body->setAngularVelocity(to_bullet(angular));
     }
 
     void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
@@ -281,8 +287,14 @@ protected:
             o->body->setWorldTransform(next);
         }
         dynamics_.stepSimulation(seconds, 0);
-        for (auto& o : objects_)
-            if (o && o->body->isActive() && !o->body->isStaticOrKinematicObject()) watch(*o, seconds);
+        for (auto& o : objects_) {
+            if (!o || o->body->isStaticOrKinematicObject()) continue;
+            if (o->body->isActive()) {
+                watch(*o, seconds);
+            } else {
+                stir(*o);  // what is woken by others waits anew
+            }
+        }
     }
 
     GroundMesher::Build region_builder() const override {
@@ -298,9 +310,17 @@ protected:
             const uint32_t a = uint32_t(manifold.getBody0()->getUserIndex()),
                            b = uint32_t(manifold.getBody1()->getUserIndex());
             float depth = -1e30f;
-            for (int i = 0; i < manifold.getNumContacts(); ++i)
-                depth = std::max(depth, -manifold.getContactPoint(i).getDistance());
-            pairs.push_back({std::min(a, b), std::max(a, b), depth});
+            vec3 point{}, normal{};  // from body 1 to body 0
+            for (int i = 0; i < manifold.getNumContacts(); ++i) {
+                const btManifoldPoint& p = manifold.getContactPoint(i);
+                depth = std::max(depth, -p.getDistance());
+                point = point + to_vec(p.getPositionWorldOnB());
+                normal = normal + to_vec(p.m_normalWorldOnB);
+            }
+            const float size = length(normal);
+            normal = size > 0 ? normal / size : vec3{};
+            pairs.push_back({std::min(a, b), std::max(a, b), depth, point / float(manifold.getNumContacts()),
+                             a < b ? normal : -normal});
         }
     }
 
@@ -325,21 +345,32 @@ private:
         float inner_radius = 0;
         bool continuous = false;
         Pose anchor;  // where it has been for `still` seconds
-        float still = 0;
+        float still = 0, slow = 0;
+        bool rests = false;
     };
 
-    static void set_sleep(Object& o, float speed) {
-        o.body->setSleepingThresholds(speed, speed / std::max(o.inner_radius, 0.05f));
+    static void set_sleep(Object& o, bool rests) {
+        const float speed = rests ? kSleeps : kNeverSleeps;
+        o.body->setSleepingThresholds(speed, speed);
+        o.rests = rests;
+    }
+    static void stir(Object& o) {
+        o.anchor = to_pose(o.body->getWorldTransform());
+        o.still = o.slow = 0;
+        if (o.rests) set_sleep(o, false);
     }
     static void watch(Object& o, float seconds) {
         const Pose now = to_pose(o.body->getWorldTransform());
         const quat turn = conjugate(o.anchor.rotation) * now.rotation;
         const bool here = length(now.position - o.anchor.position) < kStillPlace &&
                           2 * std::hypot(turn.x, turn.y, turn.z) < kStillTurn;
-        const bool was = o.still >= kStillSeconds;
         o.still = here ? o.still + seconds : 0;
         if (!here) o.anchor = now;
-        if (was != (o.still >= kStillSeconds)) set_sleep(o, was ? kSleepSpeed : kStillSpeed);
+        const bool slow = o.body->getLinearVelocity().length() < kSlow &&
+                          o.body->getAngularVelocity().length() * std::max(o.inner_radius, 0.05f) < kSlow;
+        o.slow = slow ? o.slow + seconds : 0;
+        const bool rests = o.still >= kStillSeconds || o.slow >= kSlowSeconds;
+        if (rests != o.rests) set_sleep(o, rests);
     }
 
     friend class Dynamics;

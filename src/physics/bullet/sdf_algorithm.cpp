@@ -64,19 +64,14 @@ public:
 protected:
     // Contacts found when the bodies lay as they still do, within half a millimetre and a sixth of a degree, are good for another step;
     // Bullet moves their points along. (Jolt does so too.)
-    // `more`: another manifold of the pair, or null.
-    bool as_before(const Pose& second_from_first, uint32_t revision, btManifoldResult* result,
-                   btPersistentManifold* more = nullptr) {
+    bool as_before(const Pose& second_from_first, uint32_t revision, btManifoldResult* result) {
         constexpr float kPlace = 5e-4f, kTurn = 3e-3f;
         const quat turn = conjugate(found_at_.rotation) * second_from_first.rotation;
         const float way = length(second_from_first.position - found_at_.position);
-        const int known = manifold_->getNumContacts() + (more != nullptr ? more->getNumContacts() : 0);
-        if (known > 0 && revision == revision_ && way < kPlace && 2 * std::hypot(turn.x, turn.y, turn.z) < kTurn) {
-            for (btPersistentManifold* m : {manifold_, more}) {
-                if (m == nullptr) continue;
-                result->setPersistentManifold(m);
-                result->refreshContactPoints();
-            }
+        if (manifold_->getNumContacts() > 0 && revision == revision_ && way < kPlace &&
+            2 * std::hypot(turn.x, turn.y, turn.z) < kTurn) {
+            result->setPersistentManifold(manifold_);
+            result->refreshContactPoints();
             return true;
         }
         found_at_ = second_from_first;
@@ -106,30 +101,43 @@ protected:
     std::vector<FieldContact> contacts_;
 };
 
-// Contacts with triangles of regions, with the normals that their edges allow. Bullet says which triangle before it adds them; whichever
-// body is the first, normals are out of the triangle, and points on it (btConvexTriangleCallback).
+// Contacts with triangles of regions, in the ground's frame, with the normals that their edges allow. Bullet says which triangle before it
+// adds them; whichever body is the first, normals are out of the triangle, and points on it (btConvexTriangleCallback). They are gathered,
+// not kept: Bullet takes a new point for an old one that is nearer than its threshold, and triangles are hardly larger than that, so which
+// of two neighbours' normals stayed would change from step to step, and what rests would tremble.
 class OnRegions final : public btManifoldResult {
 public:
     OnRegions(const btCollisionObjectWrapper* a, const btCollisionObjectWrapper* b, const Regions& regions,
-              const Pose& world_from_ground, bool ground_first)
-        : btManifoldResult(a, b), regions_(regions), world_(world_from_ground), ground_first_(ground_first) {}
+              const Pose& world_from_ground, bool ground_first, std::vector<FieldContact>& out)
+        : btManifoldResult(a, b),
+          regions_(regions),
+          world_(world_from_ground),
+          ground_first_(ground_first),
+          out_(out) {}
     void addContactPoint(const btVector3& normal, const btVector3& point, btScalar distance) override {
         const Regions::Entry* e = regions_.numbered(uint32_t(ground_first_ ? m_partId0 : m_partId1));
         const uint32_t triangle = uint32_t(ground_first_ ? m_index0 : m_index1);
         const Pose local = inverse(world_);
         const auto& edges = *static_cast<const RegionEdges*>(e->mesh->made.get());
-        const auto allowed =
-            edges.allowed(*e->mesh, triangle, local * to_vec(point), rotate(local.rotation, to_vec(normal)));
-        if (!allowed) return;
-        const btVector3 out = to_bullet(rotate(world_.rotation, *allowed));
-        btManifoldResult::addContactPoint(out, point + (normal - out) * distance, distance);
+        const vec3 on_ground = local * to_vec(point), out = rotate(local.rotation, to_vec(normal));
+        const auto allowed = edges.allowed(*e->mesh, triangle, on_ground, out);
+        if (allowed) out_.push_back({on_ground + out * distance, *allowed, -distance});
     }
 
 private:
     const Regions& regions_;
     Pose world_;
     bool ground_first_;
+    std::vector<FieldContact>& out_;
 };
+
+// Of many triangles only those that touch as much as the nearest does say where a body rests.
+void drop_far(std::vector<FieldContact>& contacts) {
+    constexpr float kNear = 5e-3f;  // metres
+    float deepest = -1e30f;
+    for (const FieldContact& c : contacts) deepest = std::max(deepest, c.depth);
+    std::erase_if(contacts, [&](const FieldContact& c) { return c.depth < std::min(deepest, 0.0f) - kNear; });
+}
 
 // kFieldFirst: body 0 is the field.
 template <bool kFieldFirst>
@@ -149,35 +157,33 @@ public:
             add(result, world_from_field, kFieldFirst);
             return;
         }
-        btManifoldArray met;
-        if (on_triangles_ != nullptr) on_triangles_->getAllContactManifolds(met);
-        if (as_before(field_from_convex, shape.revision(), result, met.size() > 0 ? met[0] : nullptr)) return;
+        if (as_before(field_from_convex, shape.revision(), result)) return;
         const bool triangles =
             collide_ground(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
+        if (triangles) {
+            if (on_triangles_ == nullptr) {
+                btCollisionAlgorithmConstructionInfo info;
+                info.m_dispatcher1 = m_dispatcher;
+                on_triangles_ = std::make_unique<btConvexConcaveCollisionAlgorithm>(info, a, b, kFieldFirst);
+            }
+            const btCollisionObjectWrapper regions(field->m_parent, &shape.regions(), field->getCollisionObject(),
+                                                   field->getWorldTransform(), -1, -1);
+            OnRegions gathered(a, b, *shape.sdf().regions(), world_from_field, kFieldFirst, contacts_);
+            on_triangles_->processCollision(kFieldFirst ? &regions : convex, kFieldFirst ? convex : &regions, settings,
+                                            &gathered);
+            drop_far(contacts_);
+            // Where it rests is said by triangles, how deep and which way by the field: facets would have a ball roll by steps.
+            keep_four(contacts_);
+            measure(shape.sdf(), margin(), contacts_);
+        } else {
+            on_triangles_.reset();
+        }
         if (contacts_.empty()) {
             manifold_->clearManifold();
-        } else {
-            result->setPersistentManifold(manifold_);
-            add(result, world_from_field, kFieldFirst);
-        }
-        if (!triangles) {
-            on_triangles_.reset();
             return;
         }
-        if (on_triangles_ == nullptr) {
-            btCollisionAlgorithmConstructionInfo info;
-            info.m_dispatcher1 = m_dispatcher;
-            on_triangles_ = std::make_unique<btConvexConcaveCollisionAlgorithm>(info, a, b, kFieldFirst);
-        }
-        const btCollisionObjectWrapper regions(field->m_parent, &shape.regions(), field->getCollisionObject(),
-                                               field->getWorldTransform(), -1, -1);
-        OnRegions contacts(a, b, *shape.sdf().regions(), world_from_field, kFieldFirst);
-        on_triangles_->processCollision(kFieldFirst ? &regions : convex, kFieldFirst ? convex : &regions, settings,
-                                        &contacts);
-    }
-    void getAllContactManifolds(btManifoldArray& all) override {
-        SdfAlgorithm::getAllContactManifolds(all);
-        if (on_triangles_ != nullptr) on_triangles_->getAllContactManifolds(all);
+        result->setPersistentManifold(manifold_);
+        add(result, world_from_field, kFieldFirst);
     }
 
 private:

@@ -108,7 +108,7 @@ std::shared_ptr<const void> make_region(const RegionMesh& mesh) {
 
 class JoltWorld final : public World, private ContactListener {
 public:
-    explicit JoltWorld(const WorldSettings& settings) : scratch_(kScratchBytes) {
+    explicit JoltWorld(const WorldSettings& settings) : World(settings.gravity), scratch_(kScratchBytes) {
         if (settings.threads > 1) {
             jobs_ = std::make_unique<JobSystemThreadPool>(cMaxPhysicsJobs, cMaxPhysicsBarriers, settings.threads - 1);
         } else {
@@ -144,9 +144,9 @@ public:
         physics.mPenetrationSlop = 0.005f;
         physics.mMinVelocityForRestitution = 0.5f;  // as Bullet has it here
         physics.mNumVelocitySteps = kVelocitySteps;
-        // What has kept its place, within 3 cm for 1.5 s, sleeps: a swaying stack does, a box that starts down a slope does not.
-        physics.mTimeBeforeSleep = 1.5f;
-        physics.mPointVelocitySleepThreshold = 0.02f;
+        // Jolt asks whether three points of a body stay in balls of this radius: a swaying stack does, a box that starts down a slope does not.
+        physics.mTimeBeforeSleep = kStillSeconds;
+        physics.mPointVelocitySleepThreshold = kStillPlace / kStillSeconds;
         system_.SetPhysicsSettings(physics);
     }
     ~JoltWorld() override {
@@ -267,6 +267,10 @@ protected:
         interface().ActivateBody(objects_[index]->id);
     }
 
+    void guide(uint32_t index, vec3 linear, vec3 angular) override {
+        interface().SetLinearAndAngularVelocity(objects_[index]->id, to_jolt(linear), to_jolt(angular));
+    }
+
     void swap(uint32_t index, std::shared_ptr<const SdfShape> field) override {
         auto& shape = static_cast<JoltSdfShape&>(*objects_[index]->shape);
         const bool same = shape.sdf().bounds() == field->bounds();
@@ -371,8 +375,14 @@ private:
     // Called from Jolt's threads while it steps; what they say is sorted by World::step.
     void note(const JPH::Body& body1, const JPH::Body& body2, const ContactManifold& manifold) {
         const uint32_t a = uint32_t(body1.GetUserData()), b = uint32_t(body2.GetUserData());
+        const auto& points = manifold.mRelativeContactPointsOn1;
+        Vec3 middle = Vec3::sZero();
+        for (const Vec3 p : points) middle += p;
+        middle = Vec3(manifold.mBaseOffset) + middle / float(std::max<uint>(points.size(), 1));
+        const vec3 normal = to_vec(manifold.mWorldSpaceNormal);  // from 1 to 2
         const std::lock_guard lock(mutex_);
-        touching_.push_back({std::min(a, b), std::max(a, b), manifold.mPenetrationDepth});
+        touching_.push_back(
+            {std::min(a, b), std::max(a, b), manifold.mPenetrationDepth, to_vec(middle), a < b ? -normal : normal});
     }
     // Of a contact with a body that is not the same all over. Called while Jolt steps, when no body moves.
     void give_surface(const JPH::Body& body1, const JPH::Body& body2, const ContactManifold& m,
