@@ -12,6 +12,8 @@
 namespace kiln::field {
 namespace {
 
+typedef int32_t int4 __attribute__((vector_size(16)));
+
 constexpr int kRowGrain = 2;
 constexpr float kNearCrossing = 0.125f;  // of the way to the other crossing
 constexpr float kWall = 1e-4f;           // voxels a quad keeps from its room's walls, for rounding
@@ -137,35 +139,36 @@ void DualQuads::each_edge(size_t brick, Fn&& fn) const {
 // The diagonal that stays in the quad's rooms, and of two the one that lies along a crease: the surface passes the quad's edge at
 // the crossing, and the nearer diagonal is that one.
 DualQuads::Way DualQuads::way(const uint32_t (&ring)[4], size_t brick, int texel, int axis, const Crossing& c) const {
-    const vec3 normal{c[0], c[1], c[2]};
     const vec3 low = lattice_.world(brick, texel, {});
-    const vec3 middle = lattice_.world(brick, texel, LatticePoints::on_edge(axis, c[3]));
-    float u[4], v[4], w[4], height[4];  // u, v across the edge from its line, w along it, voxels from its lower end
-    for (size_t i = 0; i < 4; ++i) {
-        const vec3 at = out_.positions[ring[i]], p = (at - low) * per_voxel_;
-        height[i] = dot(at - middle, normal);
-        u[i] = axis == 0 ? p.y : axis == 1 ? p.z : p.x;
-        v[i] = axis == 0 ? p.z : axis == 1 ? p.x : p.y;
-        w[i] = axis == 0 ? p.x : axis == 1 ? p.y : p.z;
-    }
-    // The diagonal passes the edge's line on the side of corner `side` where it meets the half plane of that corner. There it must be in
-    // the triangle of edge and corner; the rest follows, as all corners are between the planes of the edge's ends.
-    const auto stays = [&](int from, int to, int side) {
-        const float before = u[from] * v[side] - v[from] * u[side], after = u[to] * v[side] - v[to] * u[side];
-        const float share = before / (before - after);
-        const float x = u[from] + (u[to] - u[from]) * share, y = v[from] + (v[to] - v[from]) * share;
-        const float part = (x * u[side] + y * v[side]) / (u[side] * u[side] + v[side] * v[side]);
-        if (part < 0) return true;  // on the other side, which is asked too
-        const float at = w[from] + (w[to] - w[from]) * share;
-        return part <= 1 && at >= part * w[side] + kWall && at <= 1 - kWall + part * (w[side] - 1);
+    const float middle = c[3] / per_voxel_;
+    // By corner, from the edge's lower end.
+    const auto corners = [&](float vec3::*component) {
+        const auto at = [&](size_t i) { return out_.positions[ring[i]].*component - low.*component; };
+        return float4{at(0), at(1), at(2), at(3)};
     };
-    const auto in_room = [&](int from) {
-        return stays(from, (from + 2) & 3, from + 1) && stays(from, (from + 2) & 3, (from + 3) & 3);
-    };
-    const int wanted = std::fabs(height[1] + height[3]) < std::fabs(height[0] + height[2]) ? 1 : 0;
-    if (in_room(wanted)) return wanted == 0 ? Way::kFirst : Way::kSecond;
-    if (in_room(1 - wanted)) return wanted == 0 ? Way::kSecond : Way::kFirst;
-    return Way::kFan;
+    const float4 x = corners(&vec3::x), y = corners(&vec3::y), z = corners(&vec3::z);
+    const auto less = [&](float4 v, int along) { return along == axis ? v - middle : v; };
+    const float4 height = less(x, 0) * c[0] + less(y, 1) * c[1] + less(z, 2) * c[2];
+    // Voxels; u, v across the edge, w along it.
+    const auto along = [&](int a) { return (a == 0 ? x : a == 1 ? y : z) * per_voxel_; };
+    const float4 u = along((axis + 1) % 3), v = along((axis + 2) % 3), w = along(axis);
+
+    // Lane i: the diagonal between the corners before and after corner i passes the edge's line on the side of that corner where it meets
+    // the half plane of the corner. There it must be in the triangle of edge and corner; the rest follows, as all corners are between the
+    // planes of the edge's ends. On the other side the other lane is asked.
+    const auto next = [](float4 lanes) { return __builtin_shuffle(lanes, int4{1, 2, 3, 0}); };
+    const auto last = [](float4 lanes) { return __builtin_shuffle(lanes, int4{3, 0, 1, 2}); };
+    const float4 turn = u * next(v) - v * next(u), before = last(turn);
+    const float4 share = before / (before + turn);
+    const auto met = [&](float4 lanes) { return last(lanes) + (next(lanes) - last(lanes)) * share; };
+    const float4 part = (met(u) * u + met(v) * v) / (u * u + v * v), at = met(w);
+    const int4 within = (part <= 1) & (at >= part * w + kWall) & (at <= 1 - kWall + part * (w - 1));
+    const int4 stays = (part < 0) | within;
+
+    const bool first = (stays[1] & stays[3]) != 0, second = (stays[0] & stays[2]) != 0;
+    if (first && second)
+        return std::fabs(height[1] + height[3]) < std::fabs(height[0] + height[2]) ? Way::kSecond : Way::kFirst;
+    return first ? Way::kFirst : second ? Way::kSecond : Way::kFan;
 }
 
 DualQuads::Counts DualQuads::choose(size_t brick) {

@@ -23,11 +23,14 @@ void RayRefiner::run(const WideRays& rays, std::span<MarchHit> hits, std::span<c
     for (int i = 0; i < int(hits.size()); ++i) {
         const RayNote& note = notes[size_t(i)];
         MarchHit& hit = hits[size_t(i)];
-        found_[size_t(i)].yes = false;
-        if (note.least < kNearPassVoxels && (hit.state == kMarchMiss || hit.t >= note.to)) {
-            int& first = bricks_[size_t(brick_at(note.cell))].passed_by;
-            next_passed_[size_t(i)] = int16_t(first);
-            first = i;
+        found_[size_t(i)].pass = -1;
+        for (int k = 0; k < 2; ++k) {
+            const NearPass& pass = note.passes[k];
+            if (!(pass.least < kNearPassVoxels)) break;
+            if (hit.state != kMarchMiss && hit.t < pass.to) continue;
+            int& first = bricks_[size_t(brick_at(pass.cell))].passed_by;
+            next_passed_[size_t(2 * i + k)] = int16_t(first);
+            first = 2 * i + k;
         }
         if (hit.state == kMarchHit) {
             const int at = brick_at(hit.cell);
@@ -86,7 +89,7 @@ void RayRefiner::evaluate(const Brick& brick, int count) {
 // surface. Else the next round looks closer, around the least.
 void RayRefiner::search(const Brick& brick) {
     struct Stretch {
-        int ray;
+        int ray, pass;
         float from, to;
         std::array<float, 3> begin;  // where the ray is at t_begin
         float t_begin;
@@ -99,10 +102,11 @@ void RayRefiner::search(const Brick& brick) {
     for (int next = brick.passed_by; next >= 0;) {
         int count = 0;
         for (; next >= 0 && count < kMost; next = next_passed_[size_t(next)]) {
-            const RayNote& note = notes_[size_t(next)];
-            const float from = std::max(note.from - kSearchMore, 0.0f);
-            open[size_t(count++)] = {next, from, std::min(note.to + kSearchMore, rays_->t_max[next]),
-                                     in_brick(brick, next, from), from};
+            const int ray = next / 2;
+            const NearPass& pass = notes_[size_t(ray)].passes[next % 2];
+            const float from = std::max(pass.from - kSearchMore, 0.0f);
+            open[size_t(count++)] = {
+                ray, next, from, std::min(pass.to + kSearchMore, rays_->t_max[ray]), in_brick(brick, ray, from), from};
         }
         for (int round = 0; round < kSearchRounds && count > 0; ++round) {
             for (int i = 0; i < count; ++i) {
@@ -132,6 +136,7 @@ void RayRefiner::search(const Brick& brick) {
                     const float slope = solid == 0 ? -1.0f : (d[solid] - d[solid - 1]) / gap;
                     const float t = solid == 0 ? at(0) : at(solid) - d[solid] / slope;
                     MarchHit& hit = hits_[size_t(s.ray)];
+                    if (found_[size_t(s.ray)].pass >= 0 && hit.t <= t) continue;  // by its other pass, and before
                     hit.state = kMarchHit;
                     hit.t = t;
                     hit.slot = int(brick.slot);
@@ -143,12 +148,12 @@ void RayRefiner::search(const Brick& brick) {
                         (a == 0 ? hit.voxel.x : a == 1 ? hit.voxel.y : hit.voxel.z) = int(voxel);
                         (a == 0 ? hit.p.x : a == 1 ? hit.p.y : hit.p.z) = std::clamp(there[a] - voxel, 0.0f, 1.0f);
                     }
-                    found_[size_t(s.ray)] = {true, slope, there};
+                    found_[size_t(s.ray)] = {s.pass, slope, there};
                     continue;
                 }
                 const size_t low = least > 0 ? least - 1 : 0, high = std::min<size_t>(least + 1, kSearchLooks - 1);
                 if (d[low] + d[least] > gap && d[least] + d[high] > gap) continue;
-                open[size_t(left++)] = {s.ray, at(low), at(high), s.begin, s.t_begin};
+                open[size_t(left++)] = {s.ray, s.pass, at(low), at(high), s.begin, s.t_begin};
             }
             count = left;
         }
@@ -167,14 +172,15 @@ void RayRefiner::polish(const Brick& brick) {
         if (count == RayPolish::kMost) polish_all(brick, std::exchange(count, 0));
     };
     for (int ray = brick.hit_by; ray >= 0; ray = next_hit_[size_t(ray)]) {
-        if (found_[size_t(ray)].yes) continue;  // somewhere else, before
+        if (found_[size_t(ray)].pass >= 0) continue;  // somewhere else, before
         const MarchHit& hit = hits_[size_t(ray)];
         add(ray, float(hit.voxel.x) + hit.p.x, float(hit.voxel.y) + hit.p.y, float(hit.voxel.z) + hit.p.z,
             notes_[size_t(ray)].slope);
     }
-    for (int ray = brick.passed_by; ray >= 0; ray = next_passed_[size_t(ray)]) {
+    for (int pass = brick.passed_by; pass >= 0; pass = next_passed_[size_t(pass)]) {
+        const int ray = pass / 2;
         const Found& found = found_[size_t(ray)];
-        if (found.yes) add(ray, found.in_brick[0], found.in_brick[1], found.in_brick[2], found.slope);
+        if (found.pass == pass) add(ray, found.in_brick[0], found.in_brick[1], found.in_brick[2], found.slope);
     }
     if (count > 0) polish_all(brick, count);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Rays looked at once more with the bricks' own code. Texels a voxel apart cut what is convex: where a ray only just meets a solid, at its
 // outline, the trilinear march passes it by, and elsewhere it arrives a little late. So each hit is moved along its ray to where the code has
-// the surface; and the one voxel with a solid corner that a ray passed closest, and left again, is searched for a surface that the texels lost.
+// the surface; and the two voxels with a solid corner that a ray passed closest, and left again, are searched for a surface that the texels lost.
 // Code is evaluated for all rays of a block that look at one brick together, so what a ray costs depends on its neighbours, and what it finds
 // does not.
 #pragma once
@@ -24,7 +24,7 @@ public:
     void run(const WideRays& rays, std::span<MarchHit> hits, std::span<const RayNote> notes);
 
 private:
-    // A brick that rays look at, and those rays: first the one that came last; -1: none.
+    // A brick that rays look at, and those rays: first the one that came last; -1: none. Number k of a ray's passes is 2 * ray + k.
     struct Brick {
         ivec3 cell;
         uint32_t slot;
@@ -46,15 +46,16 @@ private:
     const WideRays* rays_ = nullptr;
     std::span<MarchHit> hits_;
     std::span<const RayNote> notes_;
-    static constexpr int kMostBricks = 2 * kMostRays;
+    static constexpr int kMostBricks = 3 * kMostRays;
     std::array<Brick, kMostBricks> bricks_;
     int brick_count_ = 0, last_ = 0;
     static constexpr int kRemembered = 256;
     std::array<int16_t, kRemembered> remembered_;  // bricks by a hash of the cell; -1: none
     // The next ray that passed by, or hit, the same brick. A hit that the search found: where, and how values fall there.
-    std::array<int16_t, kMostRays> next_passed_, next_hit_;
+    std::array<int16_t, 2 * size_t(kMostRays)> next_passed_;
+    std::array<int16_t, kMostRays> next_hit_;
     struct Found {
-        bool yes;
+        int pass;  // -1: none
         float slope;
         std::array<float, 3> in_brick;
     };

@@ -57,16 +57,19 @@ struct WideRays {
     const float* t_max;
 };
 
-/// What a march saw of a ray beside its hit.
-struct RayNote {
-    // Where it came nearest to what it did not meet: of the voxels with a solid corner that it left again, its value rising, the one whose
-    // values along the ray have the least lower bound.
-    float least;     ///< that bound, voxels; kNearPassVoxels: there is none below it
+/// A voxel with a solid corner that a ray left again.
+struct NearPass {
+    float least;     ///< lower bound of its value along the ray, voxels
     float from, to;  ///< the voxel's stretch of the ray
     ivec3 cell;      ///< world cell
-    float slope;     ///< of a kMarchHit's value there, along the ray
 };
-inline constexpr float kNearPassVoxels = 0.5f;
+/// What a march saw of a ray beside its hit.
+struct RayNote {
+    /// Where texels may have lost some: those with the least bounds, the least first; kNearPassVoxels where there is none.
+    NearPass passes[2];
+    float slope;  ///< of a kMarchHit's value there, along the ray
+};
+inline constexpr float kNearPassVoxels = 0.35f;
 
 /// Rays that are moved to where code has the surface, all of one brick, counted from where they met that of the texels; voxels.
 struct RayPolish {

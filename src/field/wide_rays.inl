@@ -27,6 +27,15 @@ static inline WideCubic cubic_of(const WideCorners& c, F3 p, F3 q) {
     return {lerp(low_pp, high_pp, p.z), (qpp + pqp + ppq) * 0.33333334f, (pqq + qpq + qqp) * 0.33333334f,
             lerp(low_qq, high_qq, q.z)};
 }
+// How far eight values are from those of a plane: the largest mixed difference on a face. Each of the three kinds lifts what is interpolated
+// from what four of the eight say together by a quarter of it or less.
+static inline F bend_of(const WideCorners& c) {
+    const auto mixed = [](F p, F q, F r, F s) { return abs((p - q) - (r - s)); };
+    const F xy = max(mixed(c.v00.a, c.v00.b, c.v10.a, c.v10.b), mixed(c.v01.a, c.v01.b, c.v11.a, c.v11.b));
+    const F xz = max(mixed(c.v00.a, c.v00.b, c.v01.a, c.v01.b), mixed(c.v10.a, c.v10.b, c.v11.a, c.v11.b));
+    const F yz = max(mixed(c.v00.a, c.v10.a, c.v01.a, c.v11.a), mixed(c.v00.b, c.v10.b, c.v01.b, c.v11.b));
+    return max(max(xy, xz), yz);
+}
 static inline F value_of(const WideCubic& c, F s) {
     const F r = 1.0f - s;
     return ((c.b0 * r + 3.0f * c.b1 * s) * r + 3.0f * c.b2 * s * s) * r + c.b3 * s * s * s;
@@ -531,7 +540,10 @@ struct Marching {
         const M hit = both(m, le(root, number(1)));
         if (notes != nullptr) {
             const F least = min(min(cubic.b0, cubic.b1), min(cubic.b2, cubic.b3));
-            const M near = both(without(m, hit), both(lt(least, number(kNearPassVoxels)), le(cubic.b2, cubic.b3)));
+            // Along a surface, be it a little towards it; and where texels may have lost some.
+            constexpr float kAlong = 0.1f, kRounding = 0.02f;  // voxels
+            const F lost = min(bend_of(corners) * 0.75f + kRounding, number(kNearPassVoxels));
+            const M near = both(without(m, hit), both(lt(least, lost), le(cubic.b2, cubic.b3 + kAlong)));
             if (any(near)) note_pass(near, least, ray.t_base + enter, ray.t_base + exit);
         }
         if (any(hit)) {
@@ -558,10 +570,13 @@ struct Marching {
         store(lanes.least, least), store(lanes.from, from), store(lanes.to, to);
         const GridParams& g = view.grid;
         each_lane(m, [&](int i) {
-            RayNote& note = notes[lanes.number[i]];
-            if (!(lanes.least[i] < note.least)) return;
-            note.least = lanes.least[i], note.from = lanes.from[i], note.to = lanes.to[i];
-            note.cell = {lanes.cell[0][i] + g.cell_x, lanes.cell[1][i] + g.cell_y, lanes.cell[2][i] + g.cell_z};
+            NearPass(&passes)[2] = notes[lanes.number[i]].passes;
+            if (!(lanes.least[i] < passes[1].least)) return;
+            const NearPass pass{lanes.least[i], lanes.from[i], lanes.to[i],
+                                {lanes.cell[0][i] + g.cell_x, lanes.cell[1][i] + g.cell_y, lanes.cell[2][i] + g.cell_z}};
+            const bool first = pass.least < passes[0].least;
+            passes[1] = first ? passes[0] : pass;
+            if (first) passes[0] = pass;
         });
     }
 
@@ -596,7 +611,8 @@ struct Marching {
 };
 
 void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes) {
-    for (int i = 0; notes != nullptr && i < count; ++i) notes[i].least = kNearPassVoxels;
+    for (int i = 0; notes != nullptr && i < count; ++i)
+        for (NearPass& pass : notes[i].passes) pass.least = kNearPassVoxels;
     MarchHit miss{};
     miss.state = kMarchMiss;
     miss.slot = -1;

@@ -241,6 +241,36 @@ TEST(Meshing, SharpVerticesStayInTheirVoxels) {
     }
 }
 
+TEST(Meshing, SharpVerticesOfFacesAndFansHaveTheWholeProgramsMaterialAndNormal) {
+    const HostBricks host = HostBricks::bake(worlds::jumble(11, 60).field());
+    const MeshBricks bricks(host);
+    Mesh mesh;
+    mesh_sharp(bricks, exact_of(host, bricks), mesh);
+    const size_t first = mesh.vertex_count() - mesh.late_bricks.size();
+    ASSERT_GT(mesh.late_bricks.size(), 20u);
+    const MeshSurface surface = surface_of(host, bricks, mesh, true);
+    const sdf::TapeView whole = sdf::view(host.field().program());
+    for (size_t v = first; v < mesh.vertex_count(); ++v) {
+        const vec3 p = mesh.positions[v];
+        float value;
+        sdf::MaterialMix mix;
+        sdf::evaluate_materials(whole, {&p.x, &p.y, &p.z, 1}, &value, &mix);
+        ASSERT_EQ(surface.mixes[v].id0, mix.id0) << "vertex " << v;
+        ASSERT_EQ(surface.mixes[v].weight, mix.weight) << "vertex " << v;
+        const double step = 1e-3;
+        const auto slope = [&](vec3 by) {
+            const dvec3 d{double(by.x) * step, double(by.y) * step, double(by.z) * step};
+            const dvec3 at{double(p.x), double(p.y), double(p.z)};
+            return float(sdf::evaluate(whole, {at.x + d.x, at.y + d.y, at.z + d.z}) -
+                         sdf::evaluate(whole, {at.x - d.x, at.y - d.y, at.z - d.z}));
+        };
+        const vec3 g{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})};
+        if (length(g) > 0) {
+            ASSERT_GT(dot(surface.normals[v], g), 0.9f * length(g)) << "vertex " << v;
+        }
+    }
+}
+
 TEST(Meshing, EulerCharacteristicOfSphereAndTorus) {
     EXPECT_EQ(facts(smooth_of(worlds::sphere_of(10))).euler(), 2);
     worlds::World torus{"torus", {}, {.voxel_size = 0.05f, .bounds = {{-1.5f, -1, -1.5f}, {1.5f, 1, 1.5f}}}};

@@ -53,16 +53,15 @@ std::vector<bool> outlines(const std::vector<RayHit>& picture, int width, int he
     return out;
 }
 
-TEST_P(EachKind, RefinedRaysHitWhatTheExactEditsShow) {
-    constexpr int kWidth = 320, kHeight = 180;
-    const Baked b = baked(GetParam());
+void expect_exact_rays(int kind, uint32_t seed, int width, int height) {
+    const Baked b = baked(kind, seed);
     const double voxel = 2.0 / 256;
-    const std::vector<Ray> rays = picture_rays(kWidth, kHeight);
+    const std::vector<Ray> rays = picture_rays(width, height);
     std::vector<field::MarchHit> hits(rays.size());
     b.bricks.march_refined(rays, hits.data());
     std::vector<RayHit> truth(rays.size());
     scene::ExactField(*b.program).cast(rays, truth.data());
-    const std::vector<bool> outline = outlines(truth, kWidth, kHeight, 4 * voxel);
+    const std::vector<bool> outline = outlines(truth, width, height, 4 * voxel);
     int false_hits = 0, false_misses = 0;
     std::vector<double> errors, errors_within;
     for (size_t i = 0; i < rays.size(); ++i) {
@@ -79,16 +78,23 @@ TEST_P(EachKind, RefinedRaysHitWhatTheExactEditsShow) {
     ASSERT_GT(errors_within.size(), errors.size() / 20);
     const double p99 = errors_within[errors_within.size() * 99 / 100];
     std::printf(
-        "kind %d: %d false hits, %d false misses of %zu rays; error median %.5f voxel, p99 within outlines %.4f of "
+        "kind %d seed %u: %d false hits, %d false misses of %zu rays; error median %.5f voxel, p99 within outlines "
+        "%.4f of "
         "%zu\n",
-        GetParam(), false_hits, false_misses, rays.size(), errors[errors.size() / 2], p99, errors_within.size());
+        kind, seed, false_hits, false_misses, rays.size(), errors[errors.size() / 2], p99, errors_within.size());
     EXPECT_LE(false_hits, 1e-4 * double(rays.size()));
-    EXPECT_LE(false_misses, 1e-3 * double(rays.size()));
+    EXPECT_LE(false_misses, 5e-4 * double(rays.size()));
     EXPECT_LE(errors[errors.size() / 2], 0.02);
     EXPECT_LE(p99, 0.1);
 }
 
+TEST_P(EachKind, RefinedRaysHitWhatTheExactEditsShow) { expect_exact_rays(GetParam(), 5, 320, 180); }
+
 class EachKindSlow : public testing::TestWithParam<int> {};
+
+TEST_P(EachKindSlow, RefinedRaysHitWhatTheExactEditsShow) {
+    for (const uint32_t seed : {5u, 6u, 7u}) expect_exact_rays(GetParam(), seed, 640, 360);
+}
 
 TEST_P(EachKindSlow, MeshesAreClosedNearTheSurfaceAndNeverCrossThemselves) {
     for (const uint32_t seed : {5u, 6u, 7u}) {
@@ -124,6 +130,153 @@ TEST_P(EachKindSlow, MeshesAreClosedNearTheSurfaceAndNeverCrossThemselves) {
             if (!sharp) continue;
             EXPECT_LE(rms, 0.025);
             EXPECT_LE(most, 0.5);
+        }
+    }
+}
+
+// Squared distance from p to a triangle: to its plane where the foot lies in it, else to its sides.
+double squared_distance(vec3 p, vec3 a, vec3 b, vec3 c) {
+    const auto to_side = [&](vec3 from, vec3 to) {
+        const vec3 along = to - from;
+        const float size = dot(along, along);
+        const float t = size > 0 ? std::clamp(dot(p - from, along) / size, 0.0f, 1.0f) : 0.0f;
+        const vec3 off = p - (from + along * t);
+        return double(dot(off, off));
+    };
+    const vec3 n = cross(b - a, c - a);
+    const auto left_of = [&](vec3 from, vec3 to) { return dot(cross(to - from, p - from), n) >= 0; };
+    if (left_of(a, b) && left_of(b, c) && left_of(c, a) && dot(n, n) > 0) {
+        const double height = double(dot(p - a, n));
+        return height * height / double(dot(n, n));
+    }
+    return std::min({to_side(a, b), to_side(b, c), to_side(c, a)});
+}
+
+// Symmetric Hausdorff distance at four samples a voxel, in boxes of fourteen voxels.
+TEST_P(EachKindSlow, SharpMeshAndSurfaceAreWithinSixTenthsOfAVoxelOfEachOther) {
+    constexpr float kVoxel = 2.0f / 256, kHalf = 7 * kVoxel, kStep = kVoxel / 4, kReach = 2 * kVoxel;
+    const Baked b = baked(GetParam());
+    const scene::ExactField exact(*b.program);
+    const field::MeshBricks bricks(b.bricks);
+    field::Mesh mesh;
+    field::mesh_sharp(bricks, field::exact_of(b.bricks, bricks), mesh);
+    double to_surface = 0, to_mesh = 0;
+    size_t samples = 0, points = 0, beyond = 0;
+    for (uint32_t box = 0; box < 6; ++box) {
+        const auto c = [&](uint32_t axis) { return -0.5f + uniform(17, box, axis); };
+        const vec3 center{c(0), c(1), c(2)};
+        const auto within = [&](vec3 p, float half) {
+            const vec3 d = p - center;
+            return std::max({std::abs(d.x), std::abs(d.y), std::abs(d.z)}) <= half;
+        };
+        std::vector<std::array<vec3, 3>> near;
+        std::vector<vec3> asked;
+        for (size_t t = 0; t < mesh.triangle_count(); ++t) {
+            const auto corner = [&](size_t i) { return mesh.positions[mesh.triangles[3 * t + i]]; };
+            if (!within(corner(0), kHalf + kReach + 2 * kVoxel)) continue;
+            near.push_back({corner(0), corner(1), corner(2)});
+            if (!within(corner(0), kHalf)) continue;
+            const vec3 u = corner(1) - corner(0), v = corner(2) - corner(0);
+            const int steps = std::max(1, int(std::ceil(std::max(length(u), length(v)) / kStep)));
+            for (int i = 0; i <= steps; ++i)
+                for (int k = 0; i + k <= steps; ++k)
+                    asked.push_back(corner(0) + u * (float(i) / float(steps)) + v * (float(k) / float(steps)));
+        }
+        std::vector<NearestPoint> answers(asked.size());
+        exact.nearest(asked, kReach, answers.data());
+        for (const NearestPoint& n : answers) {
+            EXPECT_TRUE(n.found);
+            to_surface = std::max(to_surface, double(std::abs(n.distance)) / double(kVoxel));
+        }
+        samples += asked.size();
+
+        asked.clear();
+        const int side = int(2 * kHalf / kStep);
+        for (int i = 0; i < side * side * side; ++i) {
+            const auto at = [&](int n) { return (float(n) + 0.5f) * kStep - kHalf; };
+            const vec3 p = center + vec3{at(i % side), at(i / side % side), at(i / side / side)};
+            if (std::abs(exact.distance({double(p.x), double(p.y), double(p.z)})) < double(kStep)) asked.push_back(p);
+        }
+        answers.resize(asked.size());
+        exact.nearest(asked, kReach, answers.data());
+        for (const NearestPoint& n : answers) {
+            if (!n.found) continue;
+            double least = 1e9;
+            for (const auto& [p, q, r] : near) {
+                const vec3 low = min(min(p, q), r), high = max(max(p, q), r), at = n.position;
+                const vec3 gap = max(max(low - at, at - high), vec3{});
+                if (double(dot(gap, gap)) < least) least = std::min(least, squared_distance(at, p, q, r));
+            }
+            const double off = std::sqrt(least) / double(kVoxel);
+            if (off > 0.6)
+                ++beyond;
+            else
+                to_mesh = std::max(to_mesh, off);
+        }
+        points += asked.size();
+    }
+    std::printf("kind %d: mesh to surface %.4f voxel of %zu samples, surface to mesh %.4f of %zu but %zu\n", GetParam(),
+                to_surface, samples, to_mesh, points, beyond);
+    EXPECT_GT(samples, 20000u);
+    EXPECT_GT(points, 20000u);
+    EXPECT_LE(to_surface, 0.6);
+    // Where things crowd there are gaps narrower than a voxel that no texel lies in: no mesh of the texels has them.
+    EXPECT_LE(beyond, GetParam() == 2 ? points / 40 : 0u);
+}
+
+// 16-bit floats are 2^-9 apart between 2 and 4; what their rounding leaves is half of that, and evaluation adds less than 1e-5.
+TEST_P(EachKindSlow, BakedTexelsAreTheExactDistanceToHalfAStepOfTheirs) {
+    const Baked b = baked(GetParam());
+    const scene::ExactField exact(*b.program);
+    const float voxel = b.bricks.field().grid().voxel_size;
+    double most = 0;
+    size_t count = 0;
+    const auto slots = b.bricks.field().slots();
+    for (size_t s = 0; s < slots.size(); s += 23) {
+        const field::BrickRecord& r = b.bricks.field().records()[slots[s]];
+        for (int i = 0; i < 512; ++i) {
+            const int x = i & 7, y = i >> 3 & 7, z = i >> 6;
+            const auto at = [&](int texel) { return double(float(texel) * voxel); };
+            const double d = exact.distance({at(r.texel_x + x), at(r.texel_y + y), at(r.texel_z + z)}) / double(voxel);
+            if (std::abs(d) > 4) continue;
+            ++count;
+            most = std::max(most, std::abs(double(b.bricks.texel(slots[s], x, y, z)) - d));
+        }
+    }
+    std::printf("kind %d: texels off by %.7f voxel at most, of %zu\n", GetParam(), most, count);
+    EXPECT_GT(count, 100000u);
+    EXPECT_LE(most, 0x1p-10 + 1e-5);
+}
+
+// Of the exact edits near the surface: with hard operations the field is a distance but for creases; blends flatten it and never steepen it.
+TEST_P(EachKindSlow, GradientsNearTheSurfaceAreOneWhereOperationsAreHardAndNeverMore) {
+    constexpr double kVoxel = 2.0 / 256, kBy = 1e-3 * kVoxel;
+    for (const float blend : {0.0f, kSmoothRadius, 2 * kSmoothRadius}) {
+        std::vector<Edit> edits = recipe(GetParam(), 5, 1000);
+        for (Edit& e : edits) e.blend_radius = blend;
+        const auto program = sdf::compile({edits, {}, {}});
+        ASSERT_TRUE(program);
+        const scene::ExactField exact(*program);
+        size_t band = 0, near_one = 0, steep = 0;
+        for (const vec3 at : random_points(200000)) {
+            const dvec3 p{double(at.x), double(at.y), double(at.z)};
+            if (std::abs(exact.distance(p)) > 3 * kVoxel) continue;
+            const auto slope = [&](double x, double y, double z) {
+                return (exact.distance({p.x + x, p.y + y, p.z + z}) - exact.distance({p.x - x, p.y - y, p.z - z})) /
+                       (2 * kBy);
+            };
+            const double size = std::hypot(slope(kBy, 0, 0), slope(0, kBy, 0), slope(0, 0, kBy));
+            ++band;
+            near_one += std::abs(size - 1) <= 0.05;
+            steep += size > 1.01;
+        }
+        const double share = double(near_one) / double(band);
+        std::printf("kind %d blend %.1f voxels: %.2f %% of %zu gradients within 5 %% of 1\n", GetParam(),
+                    double(blend) / kVoxel, 100 * share, band);
+        EXPECT_GT(band, 10000u);
+        EXPECT_EQ(steep, 0u);
+        if (blend == 0) {
+            EXPECT_GE(share, 0.99);
         }
     }
 }
