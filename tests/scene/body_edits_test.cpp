@@ -130,12 +130,12 @@ TEST(BodyEdits, AllIsTheWorldAndWhatItOverlapsAndPicturesAndWhoKeepsItSeeIt) {
         EXPECT_LT(kept.distance({0, 3, 0}), 0) << "not the bar";
         // What was kept runs, and has the hole.
         const json again = scene::run(kept, {.seconds = 0.05, .backend = engine});
-        EXPECT_NEAR((*find(again["bodies"], "two"))["mass"].get<double>(),
-                    (*find(scene::run(p.start, {.seconds = 0, .backend = engine})["bodies"], "two"))["mass"]
-                            .get<double>() -
-                        3.14159265 * 0.0225 * (0.8 + 0.4) * 1000,
-                    12)
-                << engine;
+        EXPECT_NEAR(
+            (*find(again["bodies"], "two"))["mass"].get<double>(),
+            (*find(scene::run(p.start, {.seconds = 0, .backend = engine})["bodies"], "two"))["mass"].get<double>() -
+                3.14159265 * 0.0225 * (0.8 + 0.4) * 1000,
+            12)
+            << engine;
     }
 }
 
@@ -155,7 +155,8 @@ TEST(BodyEdits, ABodyThatIsDugAwayWholeIsNoMore) {
     const std::string gone =
         R"({"add": {"shape": "sphere", "radius": 1, "position": [5, 3, 0], "op": "subtract"}, "target": "bodies"})";
     for (const std::string& engine : engines()) {
-        const json out = scene::run(world, {.seconds = 0.5, .backend = engine, .edits = {{0.1, "f", line(0.1, gone), 1}}});
+        const json out =
+            scene::run(world, {.seconds = 0.5, .backend = engine, .edits = {{0.1, "f", line(0.1, gone), 1}}});
         EXPECT_TRUE(find(out["frames"][0]["bodies"], "ball")) << engine;
         EXPECT_FALSE(find(out["frames"].back()["bodies"], "ball")) << engine;
         EXPECT_TRUE(find(out["frames"].back()["bodies"], "bar")) << engine;

@@ -34,7 +34,8 @@ protected:
         ASSERT_TRUE(opened) << opened.error().message;
         world_ = std::move(*opened);
         // The user's own step before.
-        ASSERT_TRUE(world_.apply(R"({"add": {"id": "mine", "shape": "sphere", "radius": 0.1, "position": [-3, 1, 0]}})"));
+        ASSERT_TRUE(
+            world_.apply(R"({"add": {"id": "mine", "shape": "sphere", "radius": 0.1, "position": [-3, 1, 0]}})"));
         begun_ = world_.to_json();
         steps_ = world_.history().steps().size();
     }
@@ -109,7 +110,8 @@ TEST_P(Sessions, AProgramThatEndsInPlayLeavesTheBeginningAndWhatWasDone) {
         const auto left = World::load(file_, workers);
         ASSERT_TRUE(left) << left.error().message;
         for (const char* id : {"mine", "slit", "late", "part1"}) EXPECT_TRUE(left->find_edit(id)) << id;
-        EXPECT_EQ(left->find(*left->find_edit("ball"))->node.transform.position, (vec3{5, 1, 0})) << "bodies begin anew";
+        EXPECT_EQ(left->find(*left->find_edit("ball"))->node.transform.position, (vec3{5, 1, 0}))
+            << "bodies begin anew";
     }
 }
 
