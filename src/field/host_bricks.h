@@ -80,7 +80,7 @@ public:
     /// Each hit has the bits of march() from 0 to the ray's t_max, but for the counters, which stay 0.
     void march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
     /// The same, then each moved to where its brick's own code has the surface, and what a ray only just passed looked at with that code too:
-    /// what the edits themselves would show, but for a grazing ray in a thousand. A ray's answer does not depend on the others.
+    /// what the edits themselves would show, but for one grazing ray in two thousand. A ray's answer does not depend on the others.
     void march_refined(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
     /// Not normalised, per voxel, at p in the brick of a world cell ([0, 7]³).
     vec3 gradient(uint32_t slot, ivec3 cell, vec3 p, NormalKind kind) const;
