@@ -104,9 +104,9 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
         return usage("--path has its own cameras and no --reference; leave --camera and --reference out");
     if (o.taa && (o.reference > 0 || s.view != View::Shaded))
         return usage("--taa works on shaded pictures, without --reference; leave it out");
-    if (o.transparent_layers < 0 || o.transparent_layers > 16)
-        return usage("--transparent-layers " + std::to_string(o.transparent_layers) + ": it is 0 to 16");
-    s.transparent_layers = o.transparent_layers;
+    if (o.transparent_layers && (*o.transparent_layers < 0 || *o.transparent_layers > 16))
+        return usage("--transparent-layers " + std::to_string(*o.transparent_layers) + ": it is 0 to 16");
+    if (o.transparent_layers) s.transparent_layers = *o.transparent_layers;
     s.outline_hulls = o.outline_hulls;
     s.cull_meshes = !o.no_cull;
     s.taa = o.taa;
@@ -125,9 +125,12 @@ int pictures_of_one_view(const RenderSettings& s) { return int(std::ceil(16 / (s
 std::string_view choose_quality(const PictureOptions& o, const Renderer& renderer, RenderSettings& s) {
     if (o.quality.empty()) return kQualities[size_t(Quality::High)];
     const Quality quality = quality_named(o.quality).value_or(renderer.best_quality());
-    const MeshShadows asked = s.mesh_shadows;
+    const RenderSettings asked = s;
     set_quality(s, quality);
-    if (!o.shadows.empty()) s.mesh_shadows = asked;
+    if (!o.shadows.empty()) s.mesh_shadows = asked.mesh_shadows;
+    if (o.transparent_layers) s.transparent_layers = asked.transparent_layers;
+    if (o.no_refine) s.refine = false;
+    if (o.taa) s.taa = true;
     return kQualities[size_t(quality)];
 }
 

@@ -20,7 +20,7 @@ struct PictureOptions {
     int reference = 0;
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
          atlas_by_copy = false, no_cull = false, outline_hulls = false;
-    int transparent_layers = 4;
+    std::optional<int> transparent_layers;  ///< left out: as the quality says
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high
     std::string shadows;                ///< of meshes: rays or cascades; empty: as the quality says, else rays

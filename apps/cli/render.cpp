@@ -43,7 +43,7 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_flag("--outline-hulls", o->outline_hulls,
                    "outline meshes by their back faces made larger, for comparison");
     verb->add_option("--transparent-layers", o->transparent_layers,
-                     "things of glass that one ray may go through, 0 to 16 (default 4)");
+                     "things of glass that one ray may go through, 0 to 16 (default 4, or as the quality says)");
     verb->add_flag("--no-refine", o->no_refine, "leave hits where the bricks have them, not where the edits do");
     verb->add_flag("--all-lights", o->all_lights, "every light at every pixel: the slow twin of the lists by tile");
     verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");

@@ -178,14 +178,16 @@ struct RenderSettings {
     LightTechnique lighting = LightTechnique::Clusters;
     float scale =
         1;  ///< below 1, with taa: rays a pixel along each side, [0.25, 1]; the picture is made whole over time
-    int shadow_map_side = 0;   ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
+    int shadow_map_side = 0;  ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
+    int glass_bounces =
+        4;  ///< times that glass may throw light back inside, [0, 16]; 0: and its mirror shows no other glass
     bool shown_alone = false;  ///< of a shaded picture only `srgb` is brought from the device, for whoever shows it
 };
 
-/// What a picture may cost. Low: hard shadows, of meshes by maps, surfaces as the bricks have them. Medium: the same shadows. High: everything that one picture can
-/// show. Ultra: anti-aliased over time too.
+/// What a picture may cost. Low: hard shadows, of meshes by maps; two things of glass behind one another, which throw no light back inside; surfaces as the
+/// bricks have them. Medium: the same shadows and glass. High: everything that one picture can show. Ultra: anti-aliased over time too.
 enum class Quality : uint8_t { Low, Medium, High, Ultra };
-/// Sets `refine`, `soft_shadows`, `mesh_shadows` and `taa`, no more.
+/// Sets `refine`, `soft_shadows`, `mesh_shadows`, `transparent_layers`, `glass_bounces` and `taa`, no more.
 void set_quality(RenderSettings& settings, Quality quality);
 
 /// Pixels, top row first.

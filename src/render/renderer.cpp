@@ -154,6 +154,7 @@ struct Renderer::Impl {
         in.mesh_holes = meshes->holes();
         choose_maps(frame, settings, in);
         in.transparent_layers = settings.view == View::Shaded ? std::clamp(settings.transparent_layers, 0, 16) : 0;
+        in.glass_bounces = std::clamp(settings.glass_bounces, 0, 16);
         in.has_glass = in.transparent_layers > 0 &&
                        std::any_of(frame.instances.begin(), frame.instances.end(), [](const Instance& i) {
                            return i.glass != 0 && i.bricks->field().stats().bricks > 0;
@@ -790,6 +791,8 @@ void set_quality(RenderSettings& settings, Quality quality) {
     settings.refine = quality >= Quality::Medium;
     settings.soft_shadows = quality >= Quality::High;
     settings.mesh_shadows = quality >= Quality::High ? MeshShadows::Rays : MeshShadows::Cascades;
+    settings.transparent_layers = quality >= Quality::High ? RenderSettings().transparent_layers : 2;
+    settings.glass_bounces = quality >= Quality::High ? RenderSettings().glass_bounces : 0;
     settings.taa = quality >= Quality::Ultra && settings.view == View::Shaded;
 }
 

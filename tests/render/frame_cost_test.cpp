@@ -78,6 +78,11 @@ TEST_F(FrameCostGpu, QualitiesChangeWhatTheySay) {
     RenderSettings ultra;
     set_quality(ultra, Quality::Ultra);
     EXPECT_TRUE(ultra.taa && ultra.refine && ultra.soft_shadows);
+    EXPECT_EQ(ultra.transparent_layers, 4);
+    EXPECT_EQ(ultra.glass_bounces, 4);
+    set_quality(ultra, Quality::Medium);
+    EXPECT_EQ(ultra.transparent_layers, 2);
+    EXPECT_EQ(ultra.glass_bounces, 0);
 }
 
 }  // namespace

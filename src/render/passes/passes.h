@@ -155,6 +155,7 @@ struct TileInputs {
     bool has_glass = false;   // instances that light goes through
     bool has_blends = false;  // likewise of meshes
     int transparent_layers = 0;
+    int glass_bounces = 0;  // inside glass
     std::vector<ThroughPart> through;
     bool outlines_meshes = false;  // their records follow those of edits
     bool outline_hulls = false;    // … or are not used: see draw_hulls()

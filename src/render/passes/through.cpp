@@ -229,8 +229,7 @@ Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways
 
 bool wants_front(const TileInputs& in) { return in.taa || in.particles.count > 0; }
 
-// Surfaces of glass come in twos; some more for rays that glass throws back inside.
-constexpr int kMoreSteps = 4;
+// Of what is parted from a ray where it first meets glass: the mirror, and what is thrown back inside.
 constexpr int kStepsOfParted = 6;
 
 void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const Surface& surface, Image& radiance,
@@ -259,12 +258,14 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
                {g.read(surface.seen), g.read(radiance), g.write(solid.seen), g.write(solid.light)}, push);
     ways.carried = solid.light;  // not read
     ways.step = kThroughCamera | push.step;
-    const int steps = parts ? 2 * tile.transparent_layers + kMoreSteps : tile.transparent_layers;
+    // Surfaces of glass come in twos; some more for rays that glass throws back inside.
+    const int steps = parts ? 2 * tile.transparent_layers + tile.glass_bounces : tile.transparent_layers;
+    const int steps_of_parted = tile.glass_bounces > 0 ? std::min(steps, kStepsOfParted) : 0;
     Brought brought = bring(g, tile, part.frame_of_rays, ways, solid, steps);
     Image parted = brought.total;
     if (parts) {
         brought.parted.in.frame = part.frame_of_parted;
-        parted = bring(g, tile, part.frame_of_parted, brought.parted, solid, std::min(steps, kStepsOfParted)).total;
+        parted = bring(g, tile, part.frame_of_parted, brought.parted, solid, steps_of_parted).total;
     }
     if (wants_front(tile)) {
         const First& first = brought.first;
