@@ -42,9 +42,6 @@ int make(const Options& o) {
     if (auto ok = writable(o.scene); !ok) return fail(ok.error());
     auto world = o.from.empty() ? World::parse(kFirst, o.scene) : load_scene(o.from);
     if (!world) return fail(world.error());
-    // Its files are named relative to the scene: they must be found from there, too.
-    if (!o.from.empty())
-        if (const auto there = World::parse(world->to_json(), o.scene); !there) return fail(there.error());
     if (auto saved = world->save(o.scene); !saved) return fail(saved.error());
     if (!o.json) return kDone;
     Json json;

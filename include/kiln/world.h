@@ -146,7 +146,8 @@ public:
     /// it will be saved: the edit names the model relative to that. Errors read "MODEL: what; what would be right".
     static Result<World> import(const std::string& model, const std::string& scene,
                                 const ImportSettings& settings = {});
-    /// Writes the whole scene; the old file stays until the new one is complete. Where the world was opened from there, its journal
+    /// Writes the whole scene, in another folder with its files named from there (a bundled scene's models are put beside it); the old
+    /// file stays until the new one is complete. Where the world was opened from there, its journal
     /// begins anew.
     Result<void> save(const std::string& path) const;
     /// What has been changed is on the disk when this returns (a power cut, too). Nothing to do for worlds without a journal.

@@ -17,10 +17,14 @@ namespace {
 
 std::span<const BundledScene> bundled_files() { return kBundled; }
 
+bool is_bundled(std::string_view scene) {
+    return std::any_of(std::begin(kBundled), std::end(kBundled), [&](const auto& row) { return row.name == scene; });
+}
+
 std::span<const unsigned char> bundled_model(std::string_view scene, std::string_view file) {
-    const auto same = [](std::string_view name) { return [=](const auto& row) { return row.name == name; }; };
-    if (std::none_of(std::begin(kBundled), std::end(kBundled), same(scene))) return {};
-    const auto found = std::find_if(std::begin(kModels), std::end(kModels), same(file));
+    if (!is_bundled(scene)) return {};
+    const auto found =
+        std::find_if(std::begin(kModels), std::end(kModels), [&](const auto& row) { return row.name == file; });
     return found == std::end(kModels) ? std::span<const unsigned char>{} : found->bytes;
 }
 

@@ -18,6 +18,7 @@ struct BundledModel {
 
 /// By name.
 std::span<const BundledScene> bundled_files();
+bool is_bundled(std::string_view scene);
 /// A model file that a bundled scene names; empty: there is none, or the scene is not bundled.
 std::span<const unsigned char> bundled_model(std::string_view scene, std::string_view file);
 

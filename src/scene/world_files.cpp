@@ -4,6 +4,7 @@
 #include "scene/world_impl.h"
 
 #include "scene/bundled.h"
+#include "scene/moved_files.h"
 #include "scene/suggest.h"
 
 #include "base/assert.h"
@@ -402,14 +403,44 @@ bool World::Impl::stand_on(std::string text, const std::string& scene) {
     return true;
 }
 
+namespace {
+
+// Models that a bundled scene has in the program, beside the file that it becomes.
+Result<void> bring_models(const scene::SceneData& data, const std::string& folder) {
+    for (const auto& mesh : data.meshes) {
+        const auto bytes = scene::bundled_model(data.source.name(), mesh.file);
+        if (bytes.empty()) continue;
+        const std::string_view model{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+        const std::string path = folder + mesh.file;
+        if (std::ifstream there{path, std::ios::binary}) {
+            if (std::string{std::istreambuf_iterator<char>(there), {}} == model) continue;
+            return Error{path + ": another file is there, where the scene's model belongs; move it away",
+                         ErrorKind::Failed};
+        }
+        auto file = AtomicFile::create(path);
+        if (!file) return file.error();
+        if (auto done = file->write(model); !done) return done;
+        if (auto done = file->commit(); !done) return done;
+    }
+    return {};
+}
+
+}  // namespace
+
 Result<void> World::save(const std::string& path) const {
     if (impl_->journal && scene::same_file(path, impl_->journal->scene)) return impl_->compact(*this);
     const std::string journal = scene::journal_path(path);
     if (RecordFile::is_held(journal))
         return Error{journal + ": held by a program that edits this scene; close it there first", ErrorKind::Failed};
+    const std::string folder = path.substr(0, path.find_last_of('/') + 1);
+    const bool bundled = impl_->data.folder.empty() && scene::is_bundled(impl_->data.source.name());
+    if (bundled)
+        if (auto done = bring_models(impl_->data, folder); !done) return done;
     auto file = AtomicFile::create(path);
     if (!file) return file.error();
-    if (auto done = file->write(to_json()); !done) return done;
+    if (auto done = file->write(scene::with_files_from(to_json(), bundled ? folder : impl_->data.folder, folder));
+        !done)
+        return done;
     return file->commit();
 }
 

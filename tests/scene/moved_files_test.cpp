@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+#include "scene/moved_files.h"
+
+#include "temp_folder.h"
+
+#include <kiln/world.h>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+namespace kiln {
+namespace {
+
+TEST(MovedFiles, LeadWhereTheyLed) {
+    const TempFolder folder;
+    const std::string old = (folder / "a/b").string(), here = (folder / "a").string();
+    const std::string scene =
+        R"({"meshes": [{"file": "m.glb"}, {"file": "/abs/n.obj", "id": "file"}], "x": [{"file": "../h.png", "k": [[1], {}]}]})";
+    const std::string moved = scene::with_files_from(scene, old, here);
+    EXPECT_NE(moved.find("\"file\": \"b/m.glb\""), std::string::npos) << moved;
+    EXPECT_NE(moved.find("\"file\": \"/abs/n.obj\", \"id\": \"file\""), std::string::npos) << moved;
+    EXPECT_NE(moved.find("\"file\": \"h.png\", \"k\": [[1], {}]"), std::string::npos) << moved;
+    EXPECT_EQ(scene::with_files_from(scene, old, (folder / "a/b/../b/").string()), scene);
+    EXPECT_EQ(scene::with_files_from("{\"x\":  1}", old, here), "{\"x\":  1}");
+}
+
+TEST(MovedFiles, ABundledSceneSavedHasItsModelsBesideIt) {
+    const TempFolder folder;
+    const auto world = World::load("workbench");
+    ASSERT_TRUE(world) << world.error().message;
+    const std::string file = (folder / "mine.kiln.json").string();
+    ASSERT_TRUE(world->save(file));
+    const auto again = World::load(file);
+    ASSERT_TRUE(again) << again.error().message;
+    const auto frame = again->frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_FALSE(frame->meshes.empty());
+    EXPECT_THAT(again->faults(), testing::IsEmpty());
+    ASSERT_TRUE(world->save(file)) << "the same model is there";
+    write_bytes(folder / "workbench.glb", "somebody's");
+    const auto refused = world->save(file);
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("workbench.glb: another file is there"));
+    EXPECT_EQ(bytes_of(folder / "workbench.glb"), "somebody's");
+}
+
+// Saved to another folder, a scene of a file finds what it named.
+TEST(MovedFiles, ASceneSavedElsewhereFindsItsModels) {
+    const TempFolder folder;
+    std::filesystem::create_directory(folder / "a");
+    std::filesystem::create_directory(folder / "b");
+    ASSERT_TRUE(World::load("workbench")->save((folder / "a/s.kiln.json").string()));
+    ASSERT_TRUE(World::load((folder / "a/s.kiln.json").string())->save((folder / "b/s.kiln.json").string()));
+    EXPECT_FALSE(std::filesystem::exists(folder / "b/workbench.glb"));
+    const auto moved = World::load((folder / "b/s.kiln.json").string());
+    ASSERT_TRUE(moved) << moved.error().message;
+    const auto frame = moved->frame();
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_FALSE(frame->meshes.empty());
+    EXPECT_THAT(moved->faults(), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace kiln
