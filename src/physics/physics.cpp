@@ -209,6 +209,7 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     KILN_ASSERT(b == nullptr || (b->settings.motion == Motion::Static && is_field(b->settings.shape)), "body {}",
                 id.index);
     if (b == nullptr) return;
+    std::shared_ptr<const SdfShape> before = field_ptr(b->settings.shape);
     if (b->mesher != nullptr) {
         b->mesher->changed(box_of_world(changed, inverse(b->settings.pose)));
         field = field->with(b->mesher->regions());
@@ -216,6 +217,7 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     bodies_[id.index].settings.shape = field;
     swap(id.index, std::move(field));
     wake(changed);
+    if (b->mesher != nullptr) b->mesher->let_go(std::move(before));  // meshes of regions are megabytes
 }
 
 void World::set_shape(BodyId id, std::shared_ptr<const SdfShape> shape) {
