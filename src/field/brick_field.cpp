@@ -19,16 +19,12 @@ constexpr uint64_t kUsed = uint64_t(1) << 63;
 constexpr float kHalfDiagonal = 0.8661f;  // of a side
 constexpr size_t kBodyBricks = 1 << 13;
 constexpr size_t kLeastRoom = 1 << 12;  // cells
+constexpr size_t kMostBefore = 8;       // tables that bricks are taken over from
 
 uint64_t key_of(ivec3 c) {
     const auto part = [](int v) { return uint64_t(uint32_t(v + kNearCells)) & 0xfffff; };
     return kUsed | part(c.x) | part(c.y) << 20 | part(c.z) << 40;
 }
-ivec3 cell_of(uint64_t key) {
-    const auto part = [&](int shift) { return int(key >> shift & 0xfffff) - kNearCells; };
-    return {part(0), part(20), part(40)};
-}
-
 // Rounded down; |v| below 2^30.
 int floor_of(float v) {
     const int whole = int(v);
@@ -47,10 +43,18 @@ BrickField::Table::Table(size_t count) {
 }
 
 BrickField::Table::~Table() {
-    const size_t size = size_t(1) << (64 - shift);
-    for (size_t i = 0; i < size; ++i) {
+    for (size_t i = 0; i < size(); ++i) {
         if (Brick* b = slots[i].brick.load(std::memory_order_relaxed)) let_go(b);
         if (const SdfField* p = slots[i].part.load(std::memory_order_relaxed); p != &no_part()) delete p;
+    }
+}
+
+BrickField::Brick* BrickField::Table::brick_of(uint64_t key) const {
+    const size_t mask = size() - 1;
+    for (size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> shift);; at = (at + 1) & mask) {
+        const uint64_t there = slots[at].key.load(std::memory_order_relaxed);
+        if (there == key) return slots[at].brick.load(std::memory_order_acquire);
+        if (there == 0) return nullptr;  // half of them are
     }
 }
 
@@ -82,7 +86,7 @@ BrickField::BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOp
     : exact_(std::move(exact)),
       options_(options),
       voxels_per_metre_(1 / options.voxel_size),
-      table_(2 * room.cells),
+      table_(std::make_shared<Table>(2 * room.cells)),
       room_(room.cells) {}
 
 std::shared_ptr<const BrickField> BrickField::of_body(std::shared_ptr<const SdfField> exact, float most_voxel) {
@@ -93,56 +97,76 @@ std::shared_ptr<const BrickField> BrickField::of_body(std::shared_ptr<const SdfF
 }
 
 std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfField> exact, const Box3& changed) const {
-    // Small, so that an edit costs little; it grows between steps.
-    const size_t room =
-        std::clamp(2 * cells_.load(std::memory_order_relaxed), std::min(kLeastRoom, room_), 2 * options_.most_bricks);
+    // Room for what was asked for lately, so that an edit costs little; it grows between steps.
+    size_t asked = table_->cells.load(std::memory_order_relaxed);
+    for (const Before& b : before_) asked = std::max(asked, b.table->cells.load(std::memory_order_relaxed));
+    const size_t most = options_.most_bricks;
+    const size_t room = std::clamp(2 * asked, std::min(kLeastRoom, room_), 2 * most);
     auto out = std::make_shared<BrickField>(std::move(exact), options_, Room{room});
     // A value can change only where the change is nearer than the value is large, and bricks hold values up to `near` and a diagonal.
     const float reach = options_.near + 3 * kHalfDiagonal * kBrickVoxels * options_.voxel_size;
-    out->adopt(*this, changed.empty() ? changed : changed.inflated(reach), 0);
+    out->before_.push_back({table_, changed.empty() ? changed : changed.inflated(reach)});
+    // As many as one may have is as many as are kept for those who have others.
+    size_t bricks = table_->bricks.load(std::memory_order_relaxed);
+    for (const Before& b : before_) {
+        bricks += b.table->bricks.load(std::memory_order_relaxed);
+        if (bricks > most || out->before_.size() == kMostBefore) break;
+        out->before_.push_back(b);
+    }
     return out;
 }
 
 std::shared_ptr<const SdfField> BrickField::renewed() const {
     const uint32_t now = generation_.fetch_add(1, std::memory_order_relaxed);
     const size_t most = options_.most_bricks;
-    const size_t cells = cells_.load(std::memory_order_relaxed);
+    const size_t cells = table_->cells.load(std::memory_order_relaxed);
     if (room_ < 2 * most && 2 * cells > room_) {
         auto larger = std::make_shared<BrickField>(exact_, options_, Room{std::min(4 * room_, 2 * most)});
-        larger->adopt(*this, {}, 0);
+        larger->adopt(*this, 0);
+        larger->before_ = before_;
         return larger;
     }
-    if (bricks_.load(std::memory_order_relaxed) < most && cells < 2 * most) return nullptr;
+    if (brick_count() < most && cells < 2 * most) return nullptr;
     // What nobody asked for in this generation goes.
     auto out = std::make_shared<BrickField>(exact_, options_);
-    out->adopt(*this, {}, now);
+    out->adopt(*this, now);
     return out;
 }
 
-void BrickField::adopt(const BrickField& old, const Box3& changed, uint32_t asked_since) {
-    const size_t size = size_t(1) << (64 - old.table_.shift);
-    const float side = kBrickVoxels * options_.voxel_size;
-    for (size_t i = 0; i < size; ++i) {
-        Brick* b = old.table_.slots[i].brick.load(std::memory_order_acquire);
+void BrickField::adopt(const BrickField& old, uint32_t asked_since) {
+    Table& to = *table_;
+    for (size_t i = 0; i < old.table_->size(); ++i) {
+        const Slot& slot = old.table_->slots[i];
+        Brick* b = slot.brick.load(std::memory_order_acquire);
         if (b == nullptr) continue;
-        if (asked_since != 0 &&
-            (b == far_cell() || old.table_.slots[i].asked.load(std::memory_order_relaxed) < asked_since))
-            continue;
-        const uint64_t key = old.table_.slots[i].key.load(std::memory_order_relaxed);
-        const ivec3 c = cell_of(key);
-        const vec3 low{float(c.x) * side, float(c.y) * side, float(c.z) * side};
-        if (!changed.empty() && changed.overlaps({low, low + vec3{side, side, side}})) continue;
-        size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> table_.shift);
-        const size_t mask = (size_t(1) << (64 - table_.shift)) - 1;
-        while (table_.slots[at].key.load(std::memory_order_relaxed) != 0) at = (at + 1) & mask;
+        if (asked_since != 0 && (b == far_cell() || slot.asked.load(std::memory_order_relaxed) < asked_since)) continue;
+        const uint64_t key = slot.key.load(std::memory_order_relaxed);
+        size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> to.shift);
+        while (to.slots[at].key.load(std::memory_order_relaxed) != 0) at = (at + 1) & (to.size() - 1);
         if (b != far_cell()) {
             b->holders.fetch_add(1, std::memory_order_relaxed);
-            bricks_.fetch_add(1, std::memory_order_relaxed);
+            to.bricks.fetch_add(1, std::memory_order_relaxed);
         }
-        cells_.fetch_add(1, std::memory_order_relaxed);
-        table_.slots[at].key.store(key, std::memory_order_relaxed);
-        table_.slots[at].brick.store(b, std::memory_order_release);
+        to.cells.fetch_add(1, std::memory_order_relaxed);
+        to.slots[at].key.store(key, std::memory_order_relaxed);
+        to.slots[at].brick.store(b, std::memory_order_release);
     }
+}
+
+BrickField::Brick* BrickField::take_over(uint64_t key, ivec3 cell) const {
+    const float side = kBrickVoxels * options_.voxel_size;
+    const vec3 low{float(cell.x) * side, float(cell.y) * side, float(cell.z) * side};
+    const Box3 box{low, low + vec3{side, side, side}};
+    for (const Before& b : before_) {
+        if (!b.changed.empty() && b.changed.overlaps(box)) return nullptr;  // as in all that were before
+        Brick* brick = b.table->brick_of(key);
+        if (brick == nullptr) continue;
+        if (brick == far_cell()) return brick;
+        brick->holders.fetch_add(1, std::memory_order_relaxed);
+        taken_over_.fetch_add(1, std::memory_order_relaxed);
+        return brick;
+    }
+    return nullptr;
 }
 
 bool BrickField::make(ivec3 cell, Brick& out) const {
@@ -159,17 +183,18 @@ bool BrickField::make(ivec3 cell, Brick& out) const {
 }
 
 BrickField::Slot* BrickField::find(uint64_t key, ivec3 cell) const {
-    const size_t mask = (size_t(1) << (64 - table_.shift)) - 1;
-    size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> table_.shift);
+    Table& table = *table_;
+    const size_t mask = table.size() - 1;
+    size_t at = size_t(key * 0x9e3779b97f4a7c15ull >> table.shift);
     for (int probe = 0; probe < kMostProbes; ++probe, at = (at + 1) & mask) {
-        Slot& slot = table_.slots[at];
+        Slot& slot = table.slots[at];
         uint64_t there = slot.key.load(std::memory_order_relaxed);
         if (there == 0) {
-            if (bricks_.load(std::memory_order_relaxed) >= options_.most_bricks ||
-                cells_.load(std::memory_order_relaxed) >= room_)
+            if (table.bricks.load(std::memory_order_relaxed) >= options_.most_bricks ||
+                table.cells.load(std::memory_order_relaxed) >= room_)
                 return nullptr;
             if (slot.key.compare_exchange_strong(there, key, std::memory_order_relaxed)) {
-                cells_.fetch_add(1, std::memory_order_relaxed);
+                table.cells.fetch_add(1, std::memory_order_relaxed);
                 there = key;
             }
         }
@@ -177,13 +202,16 @@ BrickField::Slot* BrickField::find(uint64_t key, ivec3 cell) const {
         const uint32_t now = generation_.load(std::memory_order_relaxed);
         if (slot.asked.load(std::memory_order_relaxed) != now) slot.asked.store(now, std::memory_order_relaxed);
         if (slot.brick.load(std::memory_order_acquire) != nullptr) return &slot;
-        auto made = std::make_unique<Brick>();
-        Brick* fresh = make(cell, *made) ? made.release() : far_cell();
+        Brick* fresh = take_over(key, cell);
+        if (fresh == nullptr) {
+            auto made = std::make_unique<Brick>();
+            fresh = make(cell, *made) ? made.release() : far_cell();
+        }
         Brick* none = nullptr;
         if (!slot.brick.compare_exchange_strong(none, fresh, std::memory_order_acq_rel)) {
             let_go(fresh);  // another thread was first, with the same bits
         } else if (fresh != far_cell()) {
-            bricks_.fetch_add(1, std::memory_order_relaxed);
+            table.bricks.fetch_add(1, std::memory_order_relaxed);
         }
         return &slot;
     }

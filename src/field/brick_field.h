@@ -15,6 +15,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 namespace kiln::field {
 
@@ -30,7 +31,8 @@ public:
     BrickField(std::shared_ptr<const SdfField> exact, const BrickFieldOptions& options);
     /// Of a bounded body: voxels of at most `most_voxel`, and 32 across its least extent; bricks all around it.
     static std::shared_ptr<const BrickField> of_body(std::shared_ptr<const SdfField> exact, float most_voxel);
-    /// The field of `exact`, whose solid differs from this one's in `changed` only. Keeps the bricks that stay what they were.
+    /// The field of `exact`, whose solid differs from this one's in `changed` only. Bricks that stay what they were are taken over when
+    /// somebody asks for them, from this one's table and from up to eight before it: an edit copies nothing.
     std::shared_ptr<const BrickField> after(std::shared_ptr<const SdfField> exact, const Box3& changed) const;
 
     float distance(vec3 p) const override {
@@ -58,7 +60,9 @@ public:
 
     const SdfField& exact() const { return *exact_; }
     float voxel_size() const { return options_.voxel_size; }
-    size_t brick_count() const { return bricks_.load(std::memory_order_relaxed); }
+    size_t brick_count() const { return table_->bricks.load(std::memory_order_relaxed); }
+    /// Those of them that are an earlier field's.
+    size_t taken_over() const { return taken_over_.load(std::memory_order_relaxed); }
 
 private:
     struct Room {
@@ -84,8 +88,18 @@ private:
     struct Table {
         explicit Table(size_t slots);
         ~Table();
+        Table(const Table&) = delete;
+        Table& operator=(const Table&) = delete;
+        size_t size() const { return size_t(1) << (64 - shift); }
+        Brick* brick_of(uint64_t key) const;  // null for none
         std::unique_ptr<Slot[]> slots;
         int shift;
+        std::atomic<size_t> bricks = 0, cells = 0;
+    };
+    // What was before, the youngest first; its bricks in `changed` (empty: none) are those of another solid.
+    struct Before {
+        std::shared_ptr<const Table> table;
+        Box3 changed;
     };
     float ask(vec3 p, vec3* gradient, Trail& trail) const;
     /// The slot of a cell, its brick made; null where there is no room for either.
@@ -93,7 +107,9 @@ private:
     /// Of the exact field, in a cell.
     const SdfField& part(Slot& slot, ivec3 cell) const;
     bool make(ivec3 cell, Brick& out) const;
-    void adopt(const BrickField& old, const Box3& changed, uint32_t asked_since);
+    /// Of those before; null for none. Held once more.
+    Brick* take_over(uint64_t key, ivec3 cell) const;
+    void adopt(const BrickField& old, uint32_t asked_since);
     static Brick* far_cell();
     static const SdfField& no_part();
     static void let_go(Brick* brick);
@@ -101,9 +117,10 @@ private:
     std::shared_ptr<const SdfField> exact_;
     BrickFieldOptions options_;
     float voxels_per_metre_;
-    Table table_;
+    std::shared_ptr<Table> table_;
+    std::vector<Before> before_;
     size_t room_;  // cells the table takes
-    mutable std::atomic<size_t> bricks_ = 0, cells_ = 0;
+    mutable std::atomic<size_t> taken_over_ = 0;
     mutable std::atomic<uint32_t> generation_ = 1;
 };
 

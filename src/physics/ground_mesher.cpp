@@ -34,8 +34,16 @@ void GroundMesher::work(Job& job) const {
 void GroundMesher::run() {
     std::unique_lock lock(mutex_);
     for (;;) {
-        changed_.wait(lock, [&] { return stop_ || !queue_.empty(); });
+        changed_.wait(lock, [&] { return stop_ || !queue_.empty() || !of_no_use_.empty(); });
         if (stop_) return;
+        if (!of_no_use_.empty()) {
+            std::vector<std::shared_ptr<const void>> gone;
+            gone.swap(of_no_use_);
+            lock.unlock();
+            gone.clear();
+            lock.lock();
+            continue;
+        }
         const std::shared_ptr<Job> job = queue_.front();
         queue_.pop_front();
         if (job->taken) continue;
@@ -58,6 +66,14 @@ const RegionMesh* GroundMesher::finish(Job& job) {
     }
     changed_.wait(lock, [&] { return job.done; });
     return job.mesh.get();
+}
+
+void GroundMesher::let_go(std::shared_ptr<const void> what) {
+    {
+        const std::lock_guard lock(mutex_);
+        of_no_use_.push_back(std::move(what));
+    }
+    changed_.notify_all();
 }
 
 void GroundMesher::visit(const Box3& box) {

@@ -30,6 +30,8 @@ public:
     void visit(const Box3& box);
     /// The field is another one in the box: what was meshed there is no more, at once.
     void changed(const Box3& box);
+    /// What is of no more use, so that the thread that frees its memory is not the one that steps.
+    void let_go(std::shared_ptr<const void> what);
     /// After `seconds` more: starts on what has settled, takes in what is due; whether regions() are others now.
     bool advance(double seconds, const std::shared_ptr<const field::SdfField>& exact);
 
@@ -59,6 +61,7 @@ private:
     std::mutex mutex_;
     std::condition_variable changed_;
     std::deque<std::shared_ptr<Job>> queue_;
+    std::vector<std::shared_ptr<const void>> of_no_use_;
     bool stop_ = false;
     std::thread thread_;
 };

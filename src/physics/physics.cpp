@@ -20,6 +20,7 @@ namespace kiln::physics {
 
 namespace {
 
+constexpr int kLoadRounds = 8;      // over the places a body lies on
 constexpr float kTouching = 5e-3f;  // metres apart that still counts as lying on something
 
 bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
@@ -209,6 +210,7 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     KILN_ASSERT(b == nullptr || (b->settings.motion == Motion::Static && is_field(b->settings.shape)), "body {}",
                 id.index);
     if (b == nullptr) return;
+    std::shared_ptr<const SdfShape> before = field_ptr(b->settings.shape);
     if (b->mesher != nullptr) {
         b->mesher->changed(box_of_world(changed, inverse(b->settings.pose)));
         field = field->with(b->mesher->regions());
@@ -216,6 +218,7 @@ void World::set_field(BodyId id, std::shared_ptr<const SdfShape> field, const Bo
     bodies_[id.index].settings.shape = field;
     swap(id.index, std::move(field));
     wake(changed);
+    if (b->mesher != nullptr) b->mesher->let_go(std::move(before));  // meshes of regions are megabytes
 }
 
 void World::set_shape(BodyId id, std::shared_ptr<const SdfShape> shape) {
@@ -286,46 +289,61 @@ void World::resist_rolling(float seconds) {
     }
 }
 
-// What holds each body up where rolling is resisted, and how hard it did so in this step.
+// What holds each body up where rolling is resisted, and how hard it did so in this step. Of several places each counts by what it bears,
+// the loads along their normals that come nearest to what the body gained: a stone in a corner lies on the floor, whatever it touches of
+// the wall.
 void World::find_supports(float seconds) {
     for (Body& b : bodies_) b.support = {};
     const auto rolls = [](const Body& b) {
         return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
                                                               [](const Surface& s) { return s.rolling_friction > 0; });
     };
-    std::vector<uint32_t> weights(bodies_.size());
+    places_.clear();
     for (const Pair& p : pairs_) {
         if (p.depth < -kTouching || (!rolls(bodies_[p.a]) && !rolls(bodies_[p.b]))) continue;
         const float friction = of_pair(surface(p.a, p.point), surface(p.b, p.point)).rolling_friction;
-        for (const bool first : {true, false}) {
-            const uint32_t on = first ? p.a : p.b, under = first ? p.b : p.a;
-            Body& b = bodies_[on];
-            if (b.settings.motion != Motion::Dynamic) continue;
-            Support& s = b.support;
-            ++weights[on];
-            s.point = s.point + p.point;
-            s.normal = first ? s.normal + p.normal : s.normal - p.normal;
-            s.rolling_friction = std::max(s.rolling_friction, friction);
-            if (bodies_[under].settings.motion == Motion::Static) continue;
-            const BodyState below = get(under);
-            s.spin = s.spin + below.angular_velocity;
-            s.velocity =
-                s.velocity + below.linear_velocity + cross(below.angular_velocity, p.point - below.pose.position);
-        }
+        for (const bool first : {true, false})
+            if (bodies_[first ? p.a : p.b].settings.motion == Motion::Dynamic)
+                places_.push_back(
+                    {first ? p.a : p.b, first ? p.b : p.a, p.point, first ? p.normal : -p.normal, friction});
     }
-    for (uint32_t i = 0; i < bodies_.size(); ++i) {
-        Body& b = bodies_[i];
-        if (weights[i] == 0) continue;
-        const float share = 1 / float(weights[i]), up = length(b.support.normal);
+    std::stable_sort(places_.begin(), places_.end(), [](const Place& p, const Place& q) { return p.on < q.on; });
+    for (size_t first = 0, last = 0; first < places_.size(); first = last) {
+        const uint32_t on = places_[first].on;
+        while (last < places_.size() && places_[last].on == on) ++last;
+        const std::span<Place> all(places_.data() + first, last - first);
+        Body& b = bodies_[on];
+        const vec3 gained =
+            get(on).linear_velocity - (b.begun + gravity_ * seconds) * std::exp(-b.settings.linear_damping * seconds);
+        vec3 left = gained;
+        for (int round = 0; round < (all.size() > 1 ? kLoadRounds : 1); ++round)
+            for (Place& p : all) {
+                const float load = std::max(p.load + dot(left, p.normal), 0.0f);
+                left = left - p.normal * (load - p.load);
+                p.load = load;
+            }
         Support& s = b.support;
+        float sum = 0;
+        for (const Place& p : all) {
+            if (!(p.load > 0)) continue;
+            sum += p.load;
+            s.point = s.point + p.point * p.load;
+            s.normal = s.normal + p.normal * p.load;
+            s.rolling_friction = std::max(s.rolling_friction, p.friction);
+            if (bodies_[p.under].settings.motion == Motion::Static) continue;
+            const BodyState below = get(p.under);
+            const vec3 there = cross(below.angular_velocity, p.point - below.pose.position);
+            s.spin = s.spin + below.angular_velocity * p.load;
+            s.velocity = s.velocity + (below.linear_velocity + there) * p.load;
+        }
+        const float up = length(s.normal);
         if (!(up > 0)) {
             s = {};
             continue;
         }
+        const float share = 1 / sum;
         s.point = s.point * share, s.spin = s.spin * share, s.velocity = s.velocity * share;
         s.normal = s.normal / up;
-        const float kept = std::exp(-b.settings.linear_damping * seconds);
-        const vec3 gained = get(i).linear_velocity - (b.begun + gravity_ * seconds) * kept;
         s.impulse = std::max(dot(gained, s.normal), 0.0f) * float(b.mass.mass);
     }
 }

@@ -198,7 +198,7 @@ protected:
     struct Pair {
         uint32_t a, b;
         float depth;
-        vec3 point{}, normal{};  // mean of where they touch; unit, from b to a
+        vec3 point{}, normal{};  // mean of where they touch, by load where the engine tells it; unit, from b to a
     };
     virtual void collect(std::vector<Pair>& pairs) const = 0;
     /// Bodies whose box meets this one, in any order.
@@ -220,6 +220,12 @@ private:
     std::vector<Touch> touches_, touches_before_;
     std::vector<ContactEvent> events_;
     std::vector<Pair> pairs_;
+    struct Place {  // where a body lies on another
+        uint32_t on, under;
+        vec3 point, normal;  // normal: towards the body
+        float friction, load = 0;
+    };
+    std::vector<Place> places_;
     size_t count_ = 0;
     int lost_ = 0;
 };

@@ -18,6 +18,9 @@ constexpr float kAlike =
     0.9f;  // cosine: starts that the field faces so like a place already found lead there, after kSure descents
 constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
+constexpr float kEnoughShell =
+    1e-5f;  // of the distance of shell points: a step that gains less ends a walk. A place is then right to
+            // a fortieth of that on a ball: it rolls with its lowest point, and does not sink
 constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
 constexpr float kTouch = 0.25f;        // of the margin: apart by no more counts as lying on it
@@ -242,16 +245,31 @@ void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_b
     if (&shape.bricks() == &shape.field() || out.empty()) return;
     measure(shape, margin, out);
     if (body.kind != Convex::Kind::Sphere || out.size() != 1) return;
-    // A ball's lowest point lies where the exact normal says: the facets of voxels would have it roll by steps, and sink into hollows
-    // that are hardly larger than it.
-    for (int i = 0; i < kDescentSteps; ++i) {
-        const FieldContact before = out.front();
-        out.front().point = shape_from_body.position - before.normal * body.size.x;
-        measure(shape, margin, out);
-        const float gain = out.empty() ? -1 : out.front().depth - before.depth;
-        if (!(gain > 0)) out.assign(1, before);
-        if (!(gain > kEnough * body.size.x)) break;
+    settle_ball(shape, shape_from_body.position, body.size.x, margin, out);
+}
+
+// A ball's lowest point lies where the exact normal says: the facets of voxels would have it roll by steps, and sink into hollows that
+// are hardly larger than it.
+void settle_ball(const SdfShape& shape, vec3 center, float radius, float margin, std::vector<FieldContact>& out) {
+    thread_local std::vector<FieldContact> one, settled;
+    settled.clear();
+    for (const FieldContact& c : out) {
+        one.assign(1, c);
+        for (int i = 0; i < kDescentSteps; ++i) {
+            const FieldContact before = one.front();
+            one.front().point = center - before.normal * radius;
+            measure(shape, margin, one);
+            const float gain = one.empty() ? -1 : one.front().depth - before.depth;
+            if (!(gain > 0)) one.assign(1, before);
+            if (!(gain > kEnough * radius)) break;
+        }
+        const FieldContact& now = one.front();
+        const bool known = std::any_of(settled.begin(), settled.end(), [&](const FieldContact& o) {
+            return length(o.point - now.point) < kSamePlace * radius && dot(o.normal, now.normal) > kSameNormal;
+        });
+        if (!known) settled.push_back(now);
     }
+    out.assign(settled.begin(), settled.end());
 }
 
 namespace {
@@ -391,7 +409,7 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
                 const float gain = found_back ? there.depth - now[i].depth : -shell.spacing();
                 if (gain > 0) now[i] = there;
                 if (gain < 0) step[i] *= 0.3f;
-                if (!(std::abs(gain) < 1e-3f * shell.spacing())) going[still++] = i;
+                if (!(std::abs(gain) < kEnoughShell * shell.spacing())) going[still++] = i;
             }
             walking = still;
         }

@@ -42,6 +42,8 @@ void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_b
 /// Contacts that were found on interpolated values, or on triangles, as the exact field has them; kMostContacts at most. Those farther apart
 /// than the margin go.
 void measure(const SdfShape& shape, float margin, std::vector<FieldContact>& contacts);
+/// Moves contacts of a ball to where they are deepest, each from where it is; those that come to one place are one.
+void settle_ball(const SdfShape& shape, vec3 center, float radius, float margin, std::vector<FieldContact>& contacts);
 
 /// Of two shapes with surface points (a world without them may be `b`): in b's frame, points on a's surface for contacts from a's
 /// points and on b's for b's; normals out of b's solid. At most kMostContacts, no two at one place.

@@ -103,15 +103,35 @@ TEST(BrickField, AfterAnEditItIsTheFieldMadeFromNothingAndKeepsWhatStays) {
     const std::vector<vec3> points = some_points(3000, 6, 3);
     for (int round = 0; round < 4; ++round) {
         (void)bits_of(*field, points);
-        const size_t before = field->brick_count();
         const vec3 at = some_points(1, 4, 50 + uint32_t(round))[0];
         edits.push_back(edit(Sphere{.radius = 0.6f}, at, round % 2 == 0 ? Op::Subtract : Op::Union, 0.1f));
         const Box3 changed = Box3{at, at}.inflated(0.6f + 0.1f);
         field = field->after(exact_of(edits), changed);
-        EXPECT_GT(field->brick_count(), before / 3);
-        EXPECT_LT(field->brick_count(), before);
+        EXPECT_EQ(field->brick_count(), 0u) << "nothing is copied";
         EXPECT_EQ(bits_of(*field, points), bits_of(BrickField(exact_of(edits), options), points)) << round;
+        EXPECT_GT(field->taken_over(), field->brick_count() / 3);
+        EXPECT_LT(field->taken_over(), field->brick_count());
     }
+}
+
+TEST(BrickField, WhatNobodyAskedForBetweenEditsIsTakenOverFromBeforeThemAndNotForEver) {
+    std::vector<Edit> edits = hills();
+    const BrickFieldOptions options{.voxel_size = 0.1f, .near = 0.3f};
+    auto field = std::make_shared<const BrickField>(exact_of(edits), options);
+    const std::vector<vec3> points = some_points(3000, 6, 3);
+    (void)bits_of(*field, points);
+    // Far apart, so that each reaches a few cells; seven hide what the first reached if any does.
+    for (int round = 0; round < 7; ++round) {
+        const vec3 at{1.5f * float(round) - 4.5f, 0, 3};
+        edits.push_back(edit(Sphere{.radius = 0.3f}, at, Op::Subtract));
+        field = field->after(exact_of(edits), Box3{at, at}.inflated(0.3f));
+    }
+    EXPECT_EQ(bits_of(*field, points), bits_of(BrickField(exact_of(edits), options), points));
+    EXPECT_GT(field->taken_over(), field->brick_count() / 4);
+    // Nobody asks for long: then nothing is left of it.
+    for (int round = 0; round < 9; ++round) field = field->after(exact_of(edits), {});
+    (void)bits_of(*field, points);
+    EXPECT_EQ(field->taken_over(), 0u);
 }
 
 TEST(BrickField, WhatWasNotAskedForLatelyMakesRoom) {

@@ -137,7 +137,7 @@ TEST_P(MeshedGround, ThingsComeToRestWhereTheyDoOnTheField) {
         EXPECT_EQ(s.world->lost(), 0);
     }
     for (size_t i = 0; i < drops.size(); ++i)
-        EXPECT_NEAR(rests[0][i].y, rests[1][i].y, (drops[i].sharp ? 0.5f : 0.25f) * kCell)
+        EXPECT_LT(length(rests[0][i] - rests[1][i]), (drops[i].sharp ? 0.5f : 0.25f) * kCell)
             << drops[i].solid.name << " " << i;
 }
 
@@ -173,6 +173,42 @@ TEST_P(MeshedGround, ASlideAcrossRegionsKeepsItsEnergyAndNeverKicks) {
         EXPECT_GT(s.world->state(id).pose.position.x, kSide) << "past what the scouts saw";
         const vec3 v = s.world->state(id).linear_velocity;
         EXPECT_NEAR(dot(v, v) / 36, 1, 0.01f) << solid.name;
+    }
+}
+
+TEST_P(MeshedGround, ASlideOverAMeshedHillKeepsItsEnergyAndNeverKicks) {
+    // Flat, over a hill of radius 20 m, and flat again, along the border of two rows of regions and across the one on the top.
+    constexpr float kCoarse = 2 * kCell, kCoarseSide = 2 * kSide;
+    const std::vector<Edit> edits{edit(Plane{}, {0, 0.03f, 0}),
+                                  edit(kiln::Sphere{.radius = 20}, {0, -19.7f, 0}, Op::Union, 3)};
+    Scene s(GetParam());
+    const BodyId ground =
+        s.add({.shape = fixed(edits, kCoarse), .motion = Motion::Static, .friction = 0, .mesh_voxel = kCoarse});
+    for (const float x : {-0.5f * kCoarseSide, 0.5f * kCoarseSide})
+        for (const float z : {-2.0f, 2.0f})
+            s.add({.shape = Convex::box({0.2f, 0.2f, 0.2f}), .pose = {{x, 0.5f, z}, {}}});
+    s.run(kLanded);
+    ASSERT_GE(meshed_regions(s, ground), 4u);
+    for (const Solid& solid : {solids()[0], solids()[1], solids()[2]}) {
+        const bool lies = solid.convex.kind == Convex::Kind::Capsule;
+        const float height = (lies ? solid.convex.size.x : half_extents(solid.convex).y) + 0.03f;
+        const BodyId id = s.add({.shape = solid.exact(),
+                                 .pose = {{-15, height, 0.01f}, lies ? axis_angle({0, 0, 1}, kPi / 2) : quat{}},
+                                 .friction = 0,
+                                 .linear_velocity = {6, 0, 0}});
+        int kicks = 0;
+        for (int i = 0; i < 320; ++i) {
+            const float before = s.world->state(id).linear_velocity.y;
+            s.world->step(kStep);
+            kicks += std::abs(s.world->state(id).linear_velocity.y - before) > 0.3f;
+        }
+        EXPECT_EQ(kicks, 0) << solid.name;
+        const BodyState state = s.world->state(id);
+        EXPECT_GT(state.pose.position.x, 12) << solid.name;
+        const float energy =
+            dot(state.linear_velocity, state.linear_velocity) / 2 + kGravity * (state.pose.position.y - height);
+        EXPECT_NEAR(energy / 18, 1, 0.01f) << solid.name;
+        s.world->remove(id);
     }
 }
 
@@ -245,7 +281,7 @@ TEST_P(MeshedGround, MeshesLandInAStepThatSimulatedTimeAloneSays) {
 
 TEST_P(MeshedGround, TheSameStepsGiveTheSameBytesForAnyNumberOfThreadsAndAnyLoad) {
     std::vector<std::vector<Pose>> all;
-    for (const int threads : {1, 2, 1}) {
+    for (const int threads : {1, 2}) {
         auto world = make_world(GetParam(), {.threads = threads});
         ASSERT_TRUE(world);
         const std::vector<Edit> edits{edit(Plane{}), edit(kiln::Sphere{.radius = 1}, {0, 0, 0}, Op::Union, 0.3f)};
@@ -257,8 +293,8 @@ TEST_P(MeshedGround, TheSameStepsGiveTheSameBytesForAnyNumberOfThreadsAndAnyLoad
             ids.push_back(*(*world)->add(
                 {.shape = shape, .pose = {{0.1f * float(i % 5), 2 + 0.5f * float(i), 0.1f * float(i % 3)}, {}}}));
         }
-        for (int i = 0; i < 200; ++i) {
-            if (i == 90) {
+        for (int i = 0; i < 140; ++i) {
+            if (i == 80) {
                 std::vector<Edit> dug = edits;
                 dug.push_back(edit(kiln::Sphere{.radius = 0.8f}, {0.5f, 0, 0}, Op::Subtract));
                 (*world)->set_field(ground, worlds::fixed(dug, kCell), {{-0.3f, -0.8f, -0.8f}, {1.3f, 0.8f, 0.8f}});
@@ -269,7 +305,6 @@ TEST_P(MeshedGround, TheSameStepsGiveTheSameBytesForAnyNumberOfThreadsAndAnyLoad
         for (const BodyId id : ids) all.back().push_back((*world)->state(id).pose);
     }
     EXPECT_EQ(all[0], all[1]);
-    EXPECT_EQ(all[0], all[2]);
 }
 
 TEST_P(MeshedGround, ABulletStopsAtAThinWallAndABuriedBodyComesOut) {

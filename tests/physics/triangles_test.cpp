@@ -68,10 +68,9 @@ TEST_P(OnTriangles, ThingsComeToRestWhereTheyDoOnTheField) {
 }
 
 TEST_P(OnTriangles, ASlideAcrossThemKeepsItsEnergyAndNeverKicks) {
-    const auto mesh = meshed({edit(Plane{}, {0, 0.03f, 0})}, 22);
+    Scene s(GetParam());
+    s.add({.shape = meshed({edit(Plane{}, {0, 0.03f, 0})}, 22), .motion = Motion::Static, .friction = 0});
     for (const Solid& solid : {solids()[0], solids()[1], solids()[2]}) {
-        Scene s(GetParam());
-        s.add({.shape = mesh, .motion = Motion::Static, .friction = 0});
         const bool lies = solid.convex.kind == Convex::Kind::Capsule;  // along its way
         const float height = (lies ? solid.convex.size.x : half_extents(solid.convex).y) + 0.03f;
         const BodyId id = s.add({.shape = solid.exact(),
@@ -87,7 +86,34 @@ TEST_P(OnTriangles, ASlideAcrossThemKeepsItsEnergyAndNeverKicks) {
         EXPECT_EQ(kicks, 0) << solid.name;
         const vec3 v = s.world->state(id).linear_velocity;
         EXPECT_NEAR(dot(v, v) / 36, 1, 0.01f) << solid.name;
+        s.world->remove(id);
     }
+}
+
+TEST_P(OnTriangles, ABowlOfThemCostsABallMoreEnergyThanTheField) {
+    const std::vector<Edit> bowl{edit(kiln::Box{.half_extents = {4.5f, 2, 4.5f}}, {0, -2.5f, 0}),
+                                 edit(kiln::Sphere{.radius = 4}, {}, Op::Subtract)};
+    const auto mesh = meshed(bowl, 5);
+    float left[2];
+    for (const bool on_mesh : {false, true}) {
+        Scene s(GetParam());
+        s.add({.shape = on_mesh ? BodyShape(mesh) : BodyShape(fixed(bowl, kCell)),
+               .motion = Motion::Static,
+               .friction = 0});
+        const float r = 0.3f, arm = 4 - r;
+        const BodyId id = s.add({.shape = Convex::sphere(r),
+                                 .pose = {{arm * std::sin(0.65f), -arm * std::cos(0.65f), 0}, {}},
+                                 .friction = 0});
+        const auto energy = [&] {
+            const BodyState b = s.world->state(id);
+            return kGravity * (b.pose.position.y + arm) + 0.5f * dot(b.linear_velocity, b.linear_velocity);
+        };
+        const float before = energy();
+        s.run(10);
+        left[on_mesh] = energy() / before;
+    }
+    EXPECT_GT(left[0], 0.92f);
+    EXPECT_LT(left[1], left[0]);
 }
 
 TEST_P(OnTriangles, AFieldTorusSlidesDownARampOfThem) {

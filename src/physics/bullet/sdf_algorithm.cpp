@@ -158,8 +158,8 @@ public:
             return;
         }
         if (as_before(field_from_convex, shape.revision(), result)) return;
-        const bool triangles =
-            collide_ground(shape.sdf(), convex_of(convex->getCollisionShape()), field_from_convex, margin(), contacts_);
+        const Convex& body = convex_of(convex->getCollisionShape());
+        const bool triangles = collide_ground(shape.sdf(), body, field_from_convex, margin(), contacts_);
         if (triangles) {
             if (on_triangles_ == nullptr) {
                 btCollisionAlgorithmConstructionInfo info;
@@ -175,6 +175,8 @@ public:
             // Where it rests is said by triangles, how deep and which way by the field: facets would have a ball roll by steps.
             keep_four(contacts_);
             measure(shape.sdf(), margin(), contacts_);
+            if (body.kind == Convex::Kind::Sphere)
+                settle_ball(shape.sdf(), field_from_convex.position, body.size.x, margin(), contacts_);
         } else {
             on_triangles_.reset();
         }
