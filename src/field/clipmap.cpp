@@ -690,6 +690,7 @@ bool Clipmap::work(const BakeBudget& budget) {
 
     Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
     Run all{.workers = options_.workers};
+    uint32_t layers = budget.layers;
     if (run.timed) {
         const auto after = [began = Clock::now()](double seconds) {
             return began + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
@@ -699,7 +700,7 @@ bool Clipmap::work(const BakeBudget& budget) {
         // What waits to be settled costs rays steps in the meantime.
         all.timed = true;
         all.deadline = after(kSettlingShare * std::max(budget.seconds - moved, 0.0));
-        (void)settle(all);
+        (void)settle(all, layers);
         all.timed = false;
     }
     moved_ = {};
@@ -750,7 +751,7 @@ bool Clipmap::work(const BakeBudget& budget) {
     if (net_ && !needs_net()) drop_net();
     all.timed = run.timed;
     all.deadline = run.deadline;
-    const bool settled = settle(all);
+    const bool settled = settle(all, layers);
     compact_code();
     count();
     return settled &&
@@ -758,7 +759,7 @@ bool Clipmap::work(const BakeBudget& budget) {
 }
 
 // Gives back what left, and makes words exact that are rough. True when all are.
-bool Clipmap::settle(const Run& run) {
+bool Clipmap::settle(const Run& run, uint32_t& layers) {
     while (!left_.empty()) {
         if (!run.goes_on()) return false;
         release_left();
@@ -766,7 +767,8 @@ bool Clipmap::settle(const Run& run) {
     for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
         while (!l.rough.empty()) {
-            if (!run.goes_on()) return false;
+            if (layers == 0 || !run.goes_on()) return false;
+            --layers;
             l.rough.settle_layer(l.cells, window(level), l.counts.missing_cells != 0);
         }
     }

@@ -43,6 +43,8 @@ struct BakeBudget {
     uint32_t bricks = std::numeric_limits<uint32_t>::max();
     /// Asked between bricks: the last one ends late. What move() took since the last work() counts.
     double seconds = std::numeric_limits<double>::infinity();
+    /// Of cells whose words are made exact (rough_cells.h), each a page high.
+    uint32_t layers = std::numeric_limits<uint32_t>::max();
 };
 
 /// Of one level; what is counted since the last move() or work() began is said so.
@@ -204,7 +206,7 @@ private:
     uint32_t all_cells() const {
         return uint32_t(options_.cells) * uint32_t(options_.cells) * uint32_t(options_.cells);
     }
-    bool settle(const Run& run);
+    bool settle(const Run& run, uint32_t& layers);
     void count();
     void compact_code();
     float distance_cells(int level, ivec3 cell) const;

@@ -222,9 +222,8 @@ void RoughCells::settle_layer(CellMap& cells, const CellBox& window, bool any_mi
     const Layer layer = layers_[size_t(next_)];
     each_run(layer.y_pages, [&](int y_first, int y_last) {
         each_run(layer.x_pages, [&](int x_first, int x_last) {
-            const CellBox box{
-                {x_first * kCellPage, y_first * kCellPage, next_ * kCellPage},
-                {x_last * kCellPage, y_last * kCellPage, (next_ + 1) * kCellPage}};
+            const CellBox box{{x_first * kCellPage, y_first * kCellPage, next_ * kCellPage},
+                              {x_last * kCellPage, y_last * kCellPage, (next_ + 1) * kCellPage}};
             update_jumps(cells, box);
             settle_marks(cells, box, window, any_missing);
         });

@@ -26,9 +26,8 @@ const HalfCodes* brick_at(const Clipmap& map, int level, ivec3 c) {
 // Of the cells of `before`, those with a brick that `after` has not.
 uint32_t lost(const Clipmap& before, const Clipmap& after, int level) {
     uint32_t out = 0;
-    each_cell(before.window(level), [&](ivec3 c) {
-        out += brick_at(before, level, c) != nullptr && brick_at(after, level, c) == nullptr;
-    });
+    each_cell(before.window(level),
+              [&](ivec3 c) { out += brick_at(before, level, c) != nullptr && brick_at(after, level, c) == nullptr; });
     return out;
 }
 // Of the cells of `after`, those with a brick that is another than `before` has.
