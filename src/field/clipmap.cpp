@@ -13,18 +13,23 @@
 #include "base/assert.h"
 #include "base/parallel_for.h"
 #include "base/profile.h"
+#include "field/cell_rows.h"
 
 #include <algorithm>
 #include <bit>
 #include <chrono>
 #include <cmath>
 #include <string>
+#include <type_traits>
+#include <utility>
 
 namespace kiln::field {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 constexpr int kMostBlocksAtOnce = 64;
+// Of a budget in time: for settling, before cells are made; for all, however long move() took.
+constexpr double kSettlingShare = 0.25, kLeastShare = 0.5;
 
 CellBox common(const CellBox& a, const CellBox& b) {
     return {{std::max(a.min.x, b.min.x), std::max(a.min.y, b.min.y), std::max(a.min.z, b.min.z)},
@@ -44,6 +49,27 @@ void each_cell(const CellBox& box, Fn&& fn) {
         }
     }
 }
+
+// fn(word, cell) for the words of a window, a page at a time.
+template <typename Cells, typename Fn>
+void each_word(Cells& cells, const CellBox& box, Fn&& fn) {
+    each_page(cells, box, [&](size_t page, const CellBox& part) {
+        auto& words = [&]() -> auto& {
+            if constexpr (std::is_const_v<Cells>)
+                return *cells.words().find(page);
+            else
+                return cells.words().write_page(page);
+        }
+        ();
+        for (int z = part.min.z; z < part.max.z; ++z) {
+            for (int y = part.min.y; y < part.max.y; ++y) {
+                auto* const row = words.data() + row_of(y, z);
+                for (int x = part.min.x; x < part.max.x; ++x) fn(row[x & (kCellPage - 1)], ivec3{x, y, z});
+            }
+        }
+    });
+}
+bool is_brick(uint32_t word) { return (word & kCellOccupied) != 0 && word != kCellMissing; }
 
 template <typename Fn>
 void each_block(const CellBox& box, Fn&& fn) {
@@ -106,12 +132,12 @@ Result<Clipmap> Clipmap::make(std::shared_ptr<const sdf::Program> program, const
     for (int level = 0; level < out.all_levels(); ++level) {
         Level& l = out.levels_[size_t(level)];
         l.cells = out.nothing_;
+        l.rough = RoughCells(options.cells);
         l.counts.missing_cells = out.all_cells();
         l.program = out.newest_;
         l.first = out.first_cell_for(level, focus_world, nullptr);
-        if (level < options.levels) out.enter(level, out.window(level));
+        if (level < options.levels) out.enter_all(level);
     }
-    out.settle();
     return out;
 }
 
@@ -178,25 +204,47 @@ void Clipmap::queue_blocks(Level& level, const CellBox& box) const {
 // These cells have come into the window, where others were before.
 void Clipmap::enter(int level, const CellBox& box) {
     Level& l = levels_[size_t(level)];
-    each_cell(box, [&](ivec3 c) {
-        const uint32_t word = l.cells.at(c.x, c.y, c.z);
-        ++l.counts.entered_cells;
-        ++l.shell;
+    each_word(l.cells, box, [&](uint32_t& word, ivec3) {
         if (word == kCellMissing) return;
-        if ((word & kCellOccupied) != 0) {
-            release(level, word & kCellSlotMask);
+        if (is_brick(word)) {
+            release(word & kCellSlotMask);
+            --l.counts.bricks;
             ++l.counts.evicted;
             room_ = true;
         }
         ++l.counts.missing_cells;
-        l.cells.set(c.x, c.y, c.z, kCellMissing);
+        word = kCellMissing;
     });
-    l.changed.push_back(box);
+    l.counts.entered_cells += uint32_t(volume(box));
+    l.shell += uint32_t(volume(box));
+    come_near(l.cells, box, true);
+    l.rough.add(box);
     queue_blocks(l, box);
     if (l.active) add_parts(*l.active, box);
 }
 
+// The same of a whole window. What was there is given back later.
+void Clipmap::enter_all(int level) {
+    Level& l = levels_[size_t(level)];
+    if (l.counts.bricks > 0) {
+        left_.push_back({std::move(l.cells)});
+        left_bricks_ += l.counts.bricks;
+        room_ = true;
+        // Those of the net are few, and drop_net() finds them by their level.
+        for (const size_t before = left_.size(); level >= options_.levels && left_.size() == before;) release_left();
+    }
+    l.cells = nothing_;
+    l.rough = RoughCells(options_.cells);
+    l.counts.evicted += l.counts.bricks;
+    l.counts.bricks = 0;
+    l.counts.missing_cells = l.counts.entered_cells = all_cells();
+    l.shell += all_cells();
+    queue_blocks(l, window(level));
+    if (l.active) add_parts(*l.active, window(level));
+}
+
 void Clipmap::move(dvec3 focus_world) {
+    const Clock::time_point began = Clock::now();
     focus_ = focus_world;
     for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
@@ -209,19 +257,10 @@ void Clipmap::move(dvec3 focus_world) {
         if (now.min == old.min) continue;
         std::erase_if(l.blocks, [&](ivec3 b) { return !meet(cells_of(b), now); });
         std::erase_if(l.refused, [&](ivec3 b) { return !meet(cells_of(b), now); });
+        l.recount = true;
         if (!meet(old, now)) {
-            enter(level, now);
+            enter_all(level);
             continue;
-        }
-        // Those beside cells that left are beside missing ones no more.
-        if (l.counts.missing_cells != 0) {
-            CellBox kept = common(old, now);
-            for (int ivec3::*const axis : {&ivec3::x, &ivec3::y, &ivec3::z}) {
-                CellBox edge = kept;
-                if (now.min.*axis > old.min.*axis) edge.max.*axis = edge.min.*axis + 1;
-                if (now.max.*axis < old.max.*axis) edge.min.*axis = edge.max.*axis - 1;
-                if (now.min.*axis != old.min.*axis) l.edges.push_back(edge);
-            }
         }
         CellBox rest = now;
         const auto shell = [&](int ivec3::*axis) {
@@ -241,7 +280,8 @@ void Clipmap::move(dvec3 focus_world) {
         shell(&ivec3::y);
         shell(&ivec3::z);
     }
-    settle();
+    count();
+    moved_ += Clock::now() - began;
 }
 
 void Clipmap::add_parts(Batch& batch, const CellBox& clip) const {
@@ -498,37 +538,38 @@ bool Clipmap::apply(int level, Run& run) {
     return true;
 }
 
-// Puts made cells in place; those that have left the window are dropped.
+// Puts made cells in place; those that have left the window are dropped. Words are right at once, if rough.
 void Clipmap::publish(int level, Made& made, const CellBox& window) {
     Level& l = levels_[size_t(level)];
-    CellBox changed{};
+    CellBox changed{}, grown{};
+    const auto cell_of = [](ivec3 c) { return CellBox{c, c + all_of(1)}; };
     for (const Emptied& e : made.empties) {
         if (!contains(window, e.cell)) continue;
         const uint32_t word = l.cells.at(e.cell.x, e.cell.y, e.cell.z);
-        const uint32_t empty = e.inside ? kCellInside : 0u;
+        uint32_t jump = 1;
         if (word == kCellMissing) {
             --l.counts.missing_cells;
-        } else if ((word & kCellOccupied) != 0) {
-            release(level, word & kCellSlotMask);
+        } else if (is_brick(word)) {
+            release(word & kCellSlotMask);
+            --l.counts.bricks;
             room_ = true;
+        } else {
+            jump = word & uint32_t(kMaxJump);
         }
-        const uint32_t jump = (word & kCellOccupied) != 0 ? uint32_t(kMaxJump) : word & 7u;
-        l.cells.set(e.cell.x, e.cell.y, e.cell.z, empty | jump);
-        changed = joined(changed, {e.cell, e.cell + all_of(1)});
+        l.cells.set(e.cell.x, e.cell.y, e.cell.z, (e.inside ? kCellInside : 0u) | jump);
+        changed = joined(changed, cell_of(e.cell));
     }
     const uint32_t base = uint32_t(code_.append(made.code));
     for (Leaf& leaf : made.leaves) {
         const ivec3 c = leaf.cell;
         if (!contains(window, c)) continue;
         const uint32_t word = l.cells.at(c.x, c.y, c.z);
-        const bool had = (word & kCellOccupied) != 0 && word != kCellMissing;
+        const bool had = is_brick(word);
         const uint32_t slot = had ? word & kCellSlotMask : take_slot(level, c);
-        changed = joined(changed, {c, c + all_of(1)});
+        if (!had) changed = joined(changed, cell_of(c));
         if (slot == kNoSlot) {
-            if (word != kCellMissing) ++l.counts.missing_cells;
-            l.cells.set(c.x, c.y, c.z, kCellMissing);
-            const ivec3 block{c.x & ~(kBlockCells - 1), c.y & ~(kBlockCells - 1), c.z & ~(kBlockCells - 1)};
-            if (std::find(l.refused.begin(), l.refused.end(), block) == l.refused.end()) l.refused.push_back(block);
+            if (word != kCellMissing) lose(level, c);
+            refuse(level, c);
             continue;
         }
         records_.resize_pages(slot / Field::Records::kPageSize + 1);
@@ -540,22 +581,60 @@ void Clipmap::publish(int level, Made& made, const CellBox& window) {
                   leaf.code_count,    uint32_t(level),    far ? 1u : 0u,      0};
         contents_.write(slot) = std::move(leaf.content);
         if (had) continue;
-        if (word == kCellMissing) --l.counts.missing_cells;
+        if (word == kCellMissing)
+            --l.counts.missing_cells;
+        else
+            grown = joined(grown, cell_of(c));
         ++l.counts.bricks;
-        l.cells.set(c.x, c.y, c.z, kCellOccupied | slot);
+        l.cells.set(c.x, c.y, c.z, kCellOccupied | (l.counts.missing_cells != 0 ? kCellFades : 0u) | slot);
     }
-    if (!changed.empty()) l.changed.push_back(changed);
+    l.rough.add(changed);
+    if (grown.empty()) return;
+    const CellBox reached = wider(grown, kMaxJump - 1);
+    const ivec3 size = reached.max - reached.min;
+    update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);
 }
 
-void Clipmap::release(int level, uint32_t slot) {
+// A cell that held something holds nothing: it is missing again.
+void Clipmap::lose(int level, ivec3 cell) {
+    Level& l = levels_[size_t(level)];
+    const CellBox box{cell, cell + all_of(1)};
+    ++l.counts.missing_cells;
+    l.cells.set(cell.x, cell.y, cell.z, kCellMissing);
+    come_near(l.cells, box, true);
+    l.rough.add(box);
+}
+
+void Clipmap::refuse(int level, ivec3 cell) {
+    Level& l = levels_[size_t(level)];
+    const auto first = [](int a) { return a & ~(kBlockCells - 1); };
+    const ivec3 block{first(cell.x), first(cell.y), first(cell.z)};
+    l.recount = true;
+    if (std::find(l.refused.begin(), l.refused.end(), block) == l.refused.end()) l.refused.push_back(block);
+}
+
+void Clipmap::release(uint32_t slot) {
     live_code_ -= records_[slot].code_count;
     pool_.release(slot);
     records_.write(slot) = {};
     contents_.write(slot) = {};
-    --levels_[size_t(level)].counts.bricks;
+}
+
+// The bricks of another page of a window that left.
+void Clipmap::release_left() {
+    Left& left = left_.back();
+    if (const CellMap::Words::Page* const page = left.cells.words().find(left.page)) {
+        for (const uint32_t word : *page) {
+            if (!is_brick(word)) continue;
+            release(word & kCellSlotMask);
+            --left_bricks_;
+        }
+    }
+    if (++left.page == left.cells.words().pages()) left_.pop_back();
 }
 
 uint32_t Clipmap::take_slot(int level, ivec3 cell) {
+    while (pool_.in_use() == options_.max_bricks && !left_.empty()) release_left();
     if (pool_.in_use() == options_.max_bricks && !give_back(level, cell)) return kNoSlot;
     return pool_.allocate();
 }
@@ -569,9 +648,8 @@ bool Clipmap::give_back(int level, ivec3 cell) {
     if (victims_level_ != finest) {
         victims_level_ = finest;
         victims_.clear();
-        each_cell(window(finest), [&](ivec3 c) {
-            const uint32_t word = l.cells.at(c.x, c.y, c.z);
-            if ((word & kCellOccupied) != 0 && word != kCellMissing) victims_.push_back({distance_cells(finest, c), c});
+        each_word(std::as_const(l.cells), window(finest), [&](uint32_t word, ivec3 c) {
+            if (is_brick(word)) victims_.push_back({distance_cells(finest, c), c});
         });
         std::sort(victims_.begin(), victims_.end(), [](const Victim& a, const Victim& b) {
             return a.distance != b.distance ? a.distance < b.distance : before(a.cell, b.cell);
@@ -583,14 +661,12 @@ bool Clipmap::give_back(int level, ivec3 cell) {
         if (finest == level && victim.distance <= distance_cells(level, cell)) return false;
         victims_.pop_back();
         const uint32_t word = l.cells.at(c.x, c.y, c.z);
-        if ((word & kCellOccupied) == 0 || word == kCellMissing) continue;
-        release(finest, word & kCellSlotMask);
-        l.cells.set(c.x, c.y, c.z, kCellMissing);
-        ++l.counts.missing_cells;
+        if (!is_brick(word)) continue;
+        release(word & kCellSlotMask);
+        --l.counts.bricks;
         ++l.counts.evicted;
-        l.changed.push_back({c, c + all_of(1)});
-        const ivec3 block{c.x & ~(kBlockCells - 1), c.y & ~(kBlockCells - 1), c.z & ~(kBlockCells - 1)};
-        if (std::find(l.refused.begin(), l.refused.end(), block) == l.refused.end()) l.refused.push_back(block);
+        lose(finest, c);
+        refuse(finest, c);
         return true;
     }
     victims_level_ = -1;  // those that came since
@@ -608,14 +684,26 @@ bool Clipmap::work(const BakeBudget& budget) {
         if (!room_) continue;
         for (const ivec3 block : l.refused) queue_blocks(l, cells_of(block));
         l.refused.clear();
+        l.recount = true;
     }
     room_ = false;
 
     Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
-    if (run.timed)
-        run.deadline = Clock::now() + std::chrono::duration_cast<Clock::duration>(
-                                          std::chrono::duration<double>(std::max(budget.seconds, 0.0)));
     Run all{.workers = options_.workers};
+    uint32_t layers = budget.layers;
+    if (run.timed) {
+        const auto after = [began = Clock::now()](double seconds) {
+            return began + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+        };
+        const double moved = std::chrono::duration<double>(moved_).count();
+        run.deadline = after(std::max(budget.seconds - moved, kLeastShare * budget.seconds));
+        // What waits to be settled costs rays steps in the meantime.
+        all.timed = true;
+        all.deadline = after(kSettlingShare * std::max(budget.seconds - moved, 0.0));
+        (void)settle(all, layers);
+        all.timed = false;
+    }
+    moved_ = {};
     const int last = options_.levels - 1;
     const bool limited = run.timed || run.bricks != kUnlimited;
     const int at_once = limited ? last + net_depth(options_.cells, all_levels() - options_.levels, run.bricks) : last;
@@ -661,45 +749,42 @@ bool Clipmap::work(const BakeBudget& budget) {
     apply_all(run);
     for (Level& l : levels_) l.shell = 0;
     if (net_ && !needs_net()) drop_net();
-    settle();
+    all.timed = run.timed;
+    all.deadline = run.deadline;
+    const bool settled = settle(all, layers);
     compact_code();
-    return std::all_of(levels_.begin(), levels_.end(), [](const Level& l) { return l.blocks.empty() && !l.active; });
+    count();
+    return settled &&
+           std::all_of(levels_.begin(), levels_.end(), [](const Level& l) { return l.blocks.empty() && !l.active; });
 }
 
-// Brings jumps, the marks of cells beside missing ones, and counts up to what changed.
-void Clipmap::settle() {
+// Gives back what left, and makes words exact that are rough. True when all are.
+bool Clipmap::settle(const Run& run, uint32_t& layers) {
+    while (!left_.empty()) {
+        if (!run.goes_on()) return false;
+        release_left();
+    }
     for (int level = 0; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
-        const CellBox window = this->window(level);
-        int64_t cells = 0;
-        for (const CellBox& box : l.changed) cells += volume(wider(box, kMaxJump - 1));
-        if (cells > int64_t(all_cells())) l.changed.assign(1, window);
-        const auto mark = [&](const CellBox& box) {
-            each_cell(common(box, window), [&](ivec3 c) {
-                const uint32_t word = l.cells.at(c.x, c.y, c.z);
-                if ((word & kCellOccupied) == 0 || word == kCellMissing) return;
-                bool beside = false;
-                if (l.counts.missing_cells != 0) {
-                    each_cell(common({c - all_of(1), c + all_of(2)}, window),
-                              [&](ivec3 n) { beside = beside || l.cells.at(n.x, n.y, n.z) == kCellMissing; });
-                }
-                l.cells.set(c.x, c.y, c.z, (word & ~kCellFades) | (beside ? kCellFades : 0u));
-            });
-        };
-        for (const CellBox& box : l.edges) mark(box);
-        l.edges.clear();
-        for (const CellBox& box : l.changed) {
-            mark(wider(box, 1));
-            const CellBox reached = wider(box, kMaxJump - 1);
-            const ivec3 size = reached.max - reached.min;
-            update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);
+        while (!l.rough.empty()) {
+            if (layers == 0 || !run.goes_on()) return false;
+            --layers;
+            l.rough.settle_layer(l.cells, window(level), l.counts.missing_cells != 0);
         }
-        l.changed.clear();
+    }
+    return true;
+}
+
+void Clipmap::count() {
+    for (int level = 0; level < all_levels(); ++level) {
+        Level& l = levels_[size_t(level)];
         l.counts.edits_waiting = (l.active ? l.active->changes : 0) + (l.waiting ? l.waiting->changes : 0);
+        if (!l.recount) continue;
+        l.recount = false;
         l.counts.refused_cells = 0;
         for (const ivec3 block : l.refused) {
-            each_cell(common(cells_of(block), window),
-                      [&](ivec3 c) { l.counts.refused_cells += l.cells.at(c.x, c.y, c.z) == kCellMissing ? 1u : 0u; });
+            each_word(std::as_const(l.cells), common(cells_of(block), window(level)),
+                      [&](uint32_t word, ivec3) { l.counts.refused_cells += word == kCellMissing ? 1u : 0u; });
         }
     }
 }

@@ -13,6 +13,7 @@
 #include "field/cell_maker.h"
 #include "field/field.h"
 #include "field/levels.gpu.h"
+#include "field/rough_cells.h"
 
 #include <array>
 #include <chrono>
@@ -40,7 +41,10 @@ inline constexpr uint32_t kNetBricks = 5 * 5 * 5;
 /// hole: no more than the bricks said here or kNetBricks, which count; where seconds are said, its coarsest level and no other. (Of 64 cells more than 12 levels leave the net fewer than it wants: then more.)
 struct BakeBudget {
     uint32_t bricks = std::numeric_limits<uint32_t>::max();
-    double seconds = std::numeric_limits<double>::infinity();  ///< asked between bricks: the last one ends late
+    /// Asked between bricks: the last one ends late. What move() took since the last work() counts.
+    double seconds = std::numeric_limits<double>::infinity();
+    /// Of cells whose words are made exact (rough_cells.h), each a page high.
+    uint32_t layers = std::numeric_limits<uint32_t>::max();
 };
 
 /// Of one level; what is counted since the last move() or work() began is said so.
@@ -61,7 +65,7 @@ public:
     static Result<Clipmap> make(std::shared_ptr<const sdf::Program> program, const ClipmapOptions& options,
                                 dvec3 focus_world);
 
-    /// Shifts the levels' windows around the focus. Bakes nothing.
+    /// Shifts the levels' windows around the focus. Bakes nothing; a leap costs no more than a step.
     void move(dvec3 focus_world);
     /// The world is `program` now, which is the last one with `changes` made.
     void edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes);
@@ -96,7 +100,7 @@ public:
     const BrickContent& content(uint32_t slot) const { return contents_[slot]; }
     const Contents& contents() const { return contents_; }
     uint32_t slot_count() const { return pool_.slot_count(); }
-    uint32_t bricks() const { return pool_.in_use(); }
+    uint32_t bricks() const { return pool_.in_use() - left_bricks_; }
     LevelsParams params() const;
 
     /// Distance to the surface as it is drawn, where a brick says: metres.
@@ -152,10 +156,10 @@ private:
         ivec3 first;
         CellMap cells;
         std::shared_ptr<const sdf::Program> program;
-        std::vector<ivec3> blocks;     // that have missing cells
-        std::vector<ivec3> refused;    // likewise, but no room
-        std::vector<CellBox> changed;  // since settle()
-        std::vector<CellBox> edges;    // of the window, where cells beside left; likewise
+        std::vector<ivec3> blocks;   // that have missing cells
+        std::vector<ivec3> refused;  // likewise, but no room
+        bool recount = false;        // what was refused
+        RoughCells rough;
         std::optional<Batch> active, waiting;
         uint32_t shell = 0;  // cells that entered since the last work()
         LevelCounts counts;
@@ -179,13 +183,17 @@ private:
     ivec3 first_cell_for(int level, dvec3 focus, const ivec3* old) const;
     CellLattice lattice(int level, ivec3 block) const;
     void enter(int level, const CellBox& box);
+    void enter_all(int level);
     void queue_blocks(Level& level, const CellBox& box) const;
     void begin(Batch& batch, int level) const;
     void add_parts(Batch& batch, const CellBox& clip) const;
     bool fill(int level, Run& run, const CellBox& where);
     bool apply(int level, Run& run);
     void publish(int level, Made& made, const CellBox& window);
-    void release(int level, uint32_t slot);
+    void lose(int level, ivec3 cell);
+    void refuse(int level, ivec3 cell);
+    void release(uint32_t slot);
+    void release_left();
     uint32_t take_slot(int level, ivec3 cell);
     bool give_back(int level, ivec3 cell);
     void forget_changes(Level& level) const;
@@ -198,7 +206,8 @@ private:
     uint32_t all_cells() const {
         return uint32_t(options_.cells) * uint32_t(options_.cells) * uint32_t(options_.cells);
     }
-    void settle();
+    bool settle(const Run& run, uint32_t& layers);
+    void count();
     void compact_code();
     float distance_cells(int level, ivec3 cell) const;
 
@@ -216,6 +225,14 @@ private:
         float distance;
         ivec3 cell;
     };
+    // A window that left as a whole: its bricks are given back page by page.
+    struct Left {
+        CellMap cells;
+        size_t page = 0;
+    };
+    std::vector<Left> left_;
+    uint32_t left_bricks_ = 0;
+    Clock::duration moved_{};      // what move() took since the last work()
     std::vector<Victim> victims_;  // of give_back(): bricks of a level, the farthest last
     int victims_level_ = -1;
     bool room_ = false;  // slots came free since cells were refused

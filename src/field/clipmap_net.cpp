@@ -76,15 +76,15 @@ void Clipmap::drop_net() {
     for (uint32_t slot = 0; slot < pool_.slot_count(); ++slot) {
         const uint32_t level = records_[slot].level;
         if (!pool_.used(slot) || level < uint32_t(options_.levels)) continue;
-        release(int(level), slot);
+        release(slot);
         room_ = true;
     }
     for (int level = options_.levels; level < all_levels(); ++level) {
         Level& l = levels_[size_t(level)];
         l.cells = nothing_;
         l.counts.missing_cells = all_cells();
-        l.changed.clear();
-        l.edges.clear();
+        l.counts.bricks = 0;
+        l.rough = RoughCells(options_.cells);
         l.refused.clear();
         forget_changes(l);
     }

@@ -4,8 +4,9 @@
 
 #include "field/jumps.h"
 
+#include "field/cell_rows.h"
+
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cstring>
 #include <vector>
@@ -94,54 +95,6 @@ private:
     std::vector<uint64_t> words_;
 };
 
-// A row of a page's cells.
-using Eight __attribute__((vector_size(32))) = uint32_t;
-
-// Word k of entry b is bit k of b.
-constexpr auto kSpread = [] {
-    std::array<std::array<uint32_t, kCellPage>, 256> out{};
-    for (uint32_t b = 0; b < 256; ++b) {
-        for (uint32_t k = 0; k < uint32_t(kCellPage); ++k) out[b][k] = (b >> k) & 1u;
-    }
-    return out;
-}();
-void spread(uint8_t bits, Eight& out) { std::memcpy(&out, kSpread[bits].data(), sizeof out); }
-
-// Where a row of cells lies in its page.
-size_t row_of(int y, int z) { return size_t(((z & (kCellPage - 1)) * kCellPage + (y & (kCellPage - 1))) * kCellPage); }
-
-// The pages that a box meets, and what each has of it.
-template <typename Fn>
-void each_page(const CellMap& cells, const CellBox& box, Fn&& fn) {
-    const auto first = [](int a) { return a >> 3; };  // kCellPage = 8; positions on a torus may be negative
-    for (int z = first(box.min.z); z * kCellPage < box.max.z; ++z) {
-        for (int y = first(box.min.y); y * kCellPage < box.max.y; ++y) {
-            for (int x = first(box.min.x); x * kCellPage < box.max.x; ++x) {
-                const ivec3 low{x * kCellPage, y * kCellPage, z * kCellPage};
-                fn(cells.page_index(x, y, z),
-                   CellBox{{std::max(low.x, box.min.x), std::max(low.y, box.min.y), std::max(low.z, box.min.z)},
-                           {std::min(low.x + kCellPage, box.max.x), std::min(low.y + kCellPage, box.max.y),
-                            std::min(low.z + kCellPage, box.max.z)}});
-            }
-        }
-    }
-}
-
-// Bit k is the highest bit of word k, of 8.
-uint32_t top_bits(const uint32_t* words) {
-    uint32_t out = 0;
-#if defined(__SSE__)
-    for (int half = 0; half < 2; ++half) {
-        float four __attribute__((vector_size(16)));
-        std::memcpy(&four, words + 4 * half, sizeof four);
-        out |= uint32_t(__builtin_ia32_movmskps(four)) << (4 * half);
-    }
-#else
-    for (int k = 0; k < kCellPage; ++k) out |= (words[k] >> 31) << k;
-#endif
-    return out;
-}
-
 }  // namespace
 
 CellBox grown(const CellBox& box, int by, ivec3 grid_size) {
@@ -190,8 +143,7 @@ void update_jumps(CellMap& cells, const CellBox& box) {
     each_page(cells, box, [&](size_t page, const CellBox& part) {
         const CellMap::Words::Page* old = cells.words().find(page);
         const int cx = part.min.x & ~(kCellPage - 1), x8 = (cx - wide.min.x) / kCellPage;
-        const Eight lanes{0, 1, 2, 3, 4, 5, 6, 7};
-        const Eight ours = Eight(lanes >= uint32_t(part.min.x - cx)) & Eight(lanes < uint32_t(part.max.x - cx));
+        const Eight ours = Eight(kLanes >= uint32_t(part.min.x - cx)) & Eight(kLanes < uint32_t(part.max.x - cx));
         for (int z = part.min.z; z < part.max.z; ++z) {
             for (int y = part.min.y; y < part.max.y; ++y) {
                 Eight had = Eight{} + uint32_t(kMaxJump);
