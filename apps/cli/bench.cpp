@@ -61,17 +61,23 @@ std::string table_of(const BenchReport& report) {
     for (const BenchRow& r : report.rows) {
         if (r.kind != kind || rows.empty()) {
             if (!rows.empty()) print_table(rows, out);
-            out += "\nkind " + std::to_string(r.kind) + ", seed " + std::to_string(r.seed) + ", " +
-                   std::to_string(r.count) + " edits\n";
-            rows = {{"row", "value", "unit", "threads", "peer", "peer's", "ratio", "of roof", "checksum"}};
+            out += "\n" +
+                   (r.scene.empty() ? "kind " + std::to_string(r.kind) + ", seed " + std::to_string(r.seed) : r.scene) +
+                   ", " + std::to_string(r.count) + " edits\n";
+            rows = {{"row", "value", "unit", "threads", "peer", "peer's", "ratio", "of roof", "bricks", "texels",
+                     "checksum"}};
             kind = r.kind;
         }
         rows.push_back({r.name, short_number(r.value), r.unit, std::to_string(r.threads), r.peer.empty() ? "-" : r.peer,
                         short_number(r.peer_value), short_number(r.ratio),
-                        std::isfinite(r.roof_ratio) ? short_number(100 * r.roof_ratio) + " %" : "-", r.checksum});
+                        std::isfinite(r.roof_ratio) ? short_number(100 * r.roof_ratio) + " %" : "-",
+                        r.texels > 0 ? short_number(r.bricks) : "-", r.texels > 0 ? std::to_string(r.texels) : "-",
+                        r.checksum});
     }
     if (!rows.empty()) print_table(rows, out);
-    out += "\nratio: above 1, Kiln is better. of roof: share of what the processor could do at best.\n";
+    out +=
+        "\nratio: above 1, Kiln is better. of roof: share of what the processor could do at best. bricks, texels: "
+        "baked.\n";
     return out;
 }
 
@@ -86,6 +92,8 @@ std::string json_of(const BenchReport& report) {
             row.text("peer", r.peer);
         }
         row.number("peer_value", r.peer_value).number("ratio", r.ratio).number("roof_ratio", r.roof_ratio);
+        row.number("bricks", r.bricks).number("texels", double(r.texels));
+        if (!r.scene.empty()) row.text("scene", r.scene);
         row.text("checksum", r.checksum).number("kind", r.kind).number("seed", r.seed).number("count", r.count);
         rows += (rows.empty() ? "" : ", ") + row.object();
     }
@@ -138,15 +146,24 @@ void add_bench(CLI::App& app, Run& run) {
                                         "Examples:\n"
                                         "  kiln bench --list\n"
                                         "  kiln bench field\n"
-                                        "  kiln bench field/rays field/bake --kind 0,1,2 --json");
+                                        "  kiln bench field/rays field/bake --kind 0,1,2 --json\n"
+                                        "  kiln bench field --scene potter");
     verb->add_option("NAME", o->names, "a family or a row of --list; everything when none is given");
     verb->add_flag("--list", o->list, "names what can be measured");
     verb->add_flag("--json", o->json, "one object, on stdout");
-    verb->add_option("--kind", o->bench.kinds, "scene: 0 pebbles, 1 carve, 2 cluster; several as 0,1,2 (default 0)")
-        ->delimiter(',');
-    verb->add_option("--seed", o->bench.seed, "of the scene (default 5)");
+    CLI::Option* kind =
+        verb->add_option("--kind", o->bench.kinds, "scene: 0 pebbles, 1 carve, 2 cluster; several as 0,1,2 (default 0)")
+            ->delimiter(',');
+    CLI::Option* seed = verb->add_option("--seed", o->bench.seed, "of the scene (default 5)");
     verb->add_option("--runs", o->bench.runs, "a row is the least of so many (default 7)");
-    verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)");
+    CLI::Option* count = verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)");
+    verb->add_option(
+            "--scene", o->bench.scene,
+            "a scene file or a bundled scene's name, for the rows of field but edits, in place of kind, seed and "
+            "count")
+        ->excludes(kind)
+        ->excludes(seed)
+        ->excludes(count);
     verb->add_option("--size", o->sizes, "of the pictures of frame, several as 480x270,1920x1080 (default 480x270)")
         ->delimiter(',');
     verb->add_option("--threads", o->bench.threads, "threads of every row (default: 1, and rows for all cores beside)")

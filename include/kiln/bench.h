@@ -33,6 +33,7 @@ struct BenchOptions {
     int runs = 7;           ///< a row is the least of so many, taken in turn with its peer's
     int resolution = 256;   ///< voxels along a side of [-1, 1]³
     std::vector<std::pair<int, int>> sizes{{480, 270}};  ///< of the pictures of `bench frame`, pixels
+    std::string scene;  ///< a scene file or a bundled scene's name for `bench field` instead of kinds, seed and count
 };
 
 inline constexpr double kNoBenchValue = std::numeric_limits<double>::quiet_NaN();
@@ -50,6 +51,9 @@ struct BenchRow {
     std::string checksum;               ///< of what was computed
     int kind = 0;
     uint32_t seed = 0, count = 0;
+    std::string scene;    ///< where it was not one of the kinds
+    double bricks = 0;    ///< that the row baked; of rows of edits, a mean edit's
+    uint64_t texels = 0;  ///< in them
 };
 
 struct BenchReport {

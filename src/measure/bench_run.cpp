@@ -70,6 +70,17 @@ std::vector<BenchInfo> bench_list() {
 Result<BenchReport> run_bench(std::span<const std::string> names, const BenchOptions& options,
                               const BenchProgress& progress) {
     if (auto fault = fault_of(options)) return std::move(*fault);
+    const std::string field = "field";
+    if (!options.scene.empty()) {
+        if (names.empty()) names = {&field, 1};
+        for (const std::string& name : names)
+            if ((name != field && !name.starts_with("field/")) || name.starts_with("field/edit.") ||
+                name == "field/undo")
+                return Error{formatted("bench {}: not of a scene; --scene is for the rows of field but edit.* and "
+                                       "undo, such as field/bake",
+                                       name),
+                             ErrorKind::Usage};
+    }
     std::set<std::string> rows;
     for (const BenchFamily& family : families()) {
         const std::string prefix = std::string(family.info.name) + "/";

@@ -1,18 +1,18 @@
 // SPDX-License-Identifier: MIT
-// `bench field`: building, editing, asking and storing the field of the recipes, at `resolution` voxels over [-1, 1]^3.
+// `bench field`: building, editing, asking and storing the field of the recipes, at `resolution` voxels over [-1, 1]^3, or (but for edits)
+// of a scene from a file.
 // Peers: OpenVDB and NanoVDB with a band of 3 voxels on each side where their plug-in is found (peers.h), else the figures that
 // they had on one core of an EPYC (Zen 5) at 4.1 GHz with kind 0, seed 5, 1000 edits and 256 voxels, marked "(anchor)".
 
-#include "measure/bench_run.h"
-
+#include "measure/bench_scene.h"
 #include "measure/contest.h"
 #include "measure/peers.h"
 #include "measure/recipes.h"
 #include "measure/roofs.h"
 #include "measure/slow.h"
+#include "measure/slow_mesh.h"
 
 #include "base/parallel_for.h"
-#include "field/cell_cases.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "field/meshing.h"
@@ -48,10 +48,8 @@ std::shared_ptr<const sdf::Program> program_of(std::span<const Edit> edits) {
     return std::make_shared<const sdf::Program>(*sdf::compile({edits, {}, {}}));
 }
 
-HostBricks made(std::shared_ptr<const sdf::Program> program, int resolution, int threads, float own_voxels = 1) {
-    field::FieldOptions options;
-    options.voxel_size = 2.0f / float(resolution);
-    options.bounds = {{-1, -1, -1}, {1, 1, 1}};
+HostBricks made(std::shared_ptr<const sdf::Program> program, field::FieldOptions options, int threads,
+                float own_voxels = 1) {
     options.workers = threads;
     options.own_voxels = own_voxels;
     return *HostBricks::build(std::move(program), options);
@@ -81,14 +79,12 @@ void apply(State& state, const Step& step) {
 
 class FieldRows {
 public:
-    FieldRows(BenchRun& run, int kind)
-        : run_(run),
-          kind_(kind),
-          edits_(recipe(kind, run.options.seed, run.options.count)),
-          program_(program_of(edits_)) {
-        const double points = std::pow(double(run.options.resolution) * 8 / 7, 3);
-        stride_ = std::max<uint64_t>(1, uint64_t(points * double(edits_.size()) / kMostSlowWork + 0.5));
-        anchored_ = kind == 0 && run.options.seed == 5 && run.options.count == 1000 && run.options.resolution == 256;
+    FieldRows(BenchRun& run, BenchScene scene) : run_(run), scene_(std::move(scene)) {
+        const vec3 size = (scene_.options.bounds.max - scene_.options.bounds.min) / scene_.options.voxel_size;
+        const double points = double(size.x) * double(size.y) * double(size.z) * std::pow(8.0 / 7, 3);
+        stride_ = stride_of(points);
+        anchored_ = scene_.file.empty() && scene_.kind == 0 && run.options.seed == 5 && run.options.count == 1000 &&
+                    run.options.resolution == 256;
     }
 
     void all() {
@@ -103,16 +99,16 @@ private:
 
     void measure(int threads) {
         if (wanted("bake")) bake(threads);
-        edit_rows(threads);
+        if (scene_.file.empty()) edit_rows(threads);
         ask(threads);
-        if (wanted("memory.per_voxel")) memory();
+        memory_rows();
     }
     void measure_parallel(int threads) {
         if (wanted("bake")) bake(threads);
         ask(threads);
     }
     void ask(int threads) {
-        if (wanted("samples.random")) samples("samples.random", start(), random_points(kRandomPoints), 8.5, threads);
+        if (wanted("samples.random")) samples("samples.random", start(), scene_.points(kRandomPoints), 8.5, threads);
         if (wanted("samples.band")) samples("samples.band", wide_start(), band_points(), 39, threads);
         if (wanted("query.single") && threads == 1) single();
         if (wanted("rays")) rays(threads);
@@ -128,9 +124,10 @@ private:
         out.unit = std::move(unit);
         out.threads = threads;
         out.more_is_better = more_is_better;
-        out.kind = kind_;
+        out.kind = scene_.kind;
         out.seed = run_.options.seed;
-        out.count = run_.options.count;
+        out.count = scene_.file.empty() ? run_.options.count : scene_.program->index.size();
+        out.scene = scene_.file;
         return out;
     }
     static void compare(BenchRow& row, std::string peer, double value) {
@@ -138,28 +135,36 @@ private:
         row.peer_value = value;
         row.ratio = row.more_is_better ? row.value / value : value / row.value;
     }
+    static void baked(BenchRow& row, double bricks) {
+        row.bricks = bricks;
+        row.texels = uint64_t(bricks * field::kBrickTexelCount + 0.5);
+    }
+    // Every how many-th piece of such work the slow way can do for, each point by every edit.
+    uint64_t stride_of(double points) const {
+        return std::max<uint64_t>(1, uint64_t(points * double(scene_.program->index.size()) / kMostSlowWork + 0.5));
+    }
     // A published figure, where nobody can be asked.
     void anchor(BenchRow& row, std::string peer, double value) const {
         if (anchored_ && row.threads == 1) compare(row, std::move(peer) + " (anchor)", value);
     }
 
     const HostBricks& start() {
-        if (!start_) start_ = std::make_unique<HostBricks>(made(program_, run_.options.resolution, 0));
+        if (!start_) start_ = std::make_unique<HostBricks>(made(scene_.program, scene_.options, 0));
         return *start_;
     }
     // Owns its whole band of 3 voxels, so that every point of the band lies in a brick.
     const HostBricks& wide_start() {
-        if (!wide_start_) wide_start_ = std::make_unique<HostBricks>(made(program_, run_.options.resolution, 0, 4));
+        if (!wide_start_) wide_start_ = std::make_unique<HostBricks>(made(scene_.program, scene_.options, 0, 4));
         return *wide_start_;
     }
     const Stored& slow() {
-        if (!slow_) slow_ = std::make_unique<Stored>(brute_force(*program_, start().field(), stride_));
+        if (!slow_) slow_ = std::make_unique<Stored>(brute_force(*scene_.program, start().field(), stride_));
         return *slow_;
     }
-    double voxel() const { return 2.0 / run_.options.resolution; }
+    double voxel() const { return double(scene_.options.voxel_size); }
     void* peer_grid() {
-        if (!peer_ && peers() != nullptr) {
-            const std::vector<KilnPeerEdit> list = peer_edits(edits_);
+        if (!peer_ && peers() != nullptr && scene_.file.empty()) {
+            const std::vector<KilnPeerEdit> list = peer_edits(scene_.edits);
             peer_.reset(peers()->build(list.data(), uint32_t(list.size()), voxel(), hardware_workers()));
         }
         return peer_.get();
@@ -180,10 +185,10 @@ private:
         HostBricks last;
         std::vector<Contestant> turns{[&] {
             last = {};
-            return seconds_of([&] { last = made(program_, run_.options.resolution, threads); });
+            return seconds_of([&] { last = made(scene_.program, scene_.options, threads); });
         }};
-        const std::vector<KilnPeerEdit> list = peer_edits(edits_);
-        if (peers() != nullptr)
+        const std::vector<KilnPeerEdit> list = peer_edits(scene_.edits);
+        if (peers() != nullptr && scene_.file.empty())
             turns.push_back([&] {
                 PeerGrid grid;
                 return seconds_of(
@@ -197,6 +202,7 @@ private:
             anchor(out, "OpenVDB", 1224);
         }
         out.roof_ratio = roots_of(last.field(), last.field().slots()) / (roofs().roots * threads) / least[0];
+        baked(out, double(last.field().slots().size()));
         run_.add_checked(out, stored(last, stride_).checksum, slow().checksum);
     }
 
@@ -208,7 +214,7 @@ private:
 
     std::vector<Step> history(Change change) const {
         std::vector<Step> out;
-        List list(edits_.begin(), edits_.end());
+        List list(scene_.edits.begin(), scene_.edits.end());
         for (uint32_t m = 0; m < kEdits; ++m) {
             const List before = list;
             change(list, m);
@@ -220,7 +226,7 @@ private:
         return out;
     }
     std::vector<Edit> after(const std::vector<Step>& steps) const {
-        List list(edits_.begin(), edits_.end());
+        List list(scene_.edits.begin(), scene_.edits.end());
         for (const Step& step : steps) {
             list.resize(std::max<size_t>(list.size(), step.position + 1));
             list[step.position] = step.after;
@@ -238,6 +244,7 @@ private:
         uint64_t checksum = 0;  // after all edits
         uint64_t undone = 0;    // after the undo of all of them
         double roots = 0;       // a mean edit's
+        double bricks = 0;      // that it baked
     };
 
     // What takes the caches from an edit, before each.
@@ -248,17 +255,18 @@ private:
                      Caches caches = Caches::Warm) {
         Turns out;
         const bool peer = with_peer && peer_grid() != nullptr;
-        State fresh{*program_, made(program_, run_.options.resolution, threads), {}};
-        for (uint32_t i = 0; i < edits_.size(); ++i) fresh.rows.push_back(i);
+        State fresh{*scene_.program, made(scene_.program, scene_.options, threads), {}};
+        for (uint32_t i = 0; i < scene_.edits.size(); ++i) fresh.rows.push_back(i);
         std::vector<uint64_t> other(caches == Caches::Cold ? kCacheWords : 0);
         const auto least = [&](double& to, double seconds) { to = std::min(to, seconds); };
         for (int turn = 0; turn < run_.options.runs; ++turn) {
             State state = fresh;
-            out.roots = 0;
+            out.roots = out.bricks = 0;
             for (uint32_t m = 0; m < steps.size(); ++m) {
                 for (uint64_t& word : other) ++word;
                 least(out.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
                 out.roots += roots_of(state.bricks.field(), state.bricks.field().jobs()) / kEdits;
+                out.bricks += double(state.bricks.field().jobs().size()) / kEdits;
             }
             if (turn == 0) out.checksum = stored(state.bricks).checksum;
             for (uint32_t m = undo ? uint32_t(steps.size()) : 0; m-- > 0;)
@@ -296,6 +304,7 @@ private:
                     anchor(out, "OpenVDB", published);
                 }
                 out.roof_ratio = turns.roots / roofs().roots / seconds;
+                baked(out, turns.bricks);
                 return out;
             };
             if (wanted("edit.mean"))
@@ -308,6 +317,7 @@ private:
             if (undo) {
                 BenchRow out = row("undo", mean(turns.backwards) * 1e6, "µs", threads);
                 out.roof_ratio = turns.roots / roofs().roots / mean(turns.backwards);
+                baked(out, turns.bricks);
                 run_.add_checked(out, turns.undone, stored(start()).checksum);
             }
         }
@@ -317,6 +327,7 @@ private:
             const Turns turns = take_turns(bites, false, false, threads, Caches::Cold);
             BenchRow out = row("edit.cold", mean(turns.forwards) * 1e6, "µs", threads);
             out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
+            baked(out, turns.bricks);
             run_.add_checked(out, turns.checksum, rebuilt(after(bites)));
         }
         for (const auto& [name, count] : kAmong) {
@@ -356,6 +367,7 @@ private:
             const Turns turns = take_turns(steps, false, false, threads);
             BenchRow out = row(way.name, mean(turns.forwards) * 1e6, "µs", threads);
             out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
+            baked(out, turns.bricks);
             run_.add_checked(out, turns.checksum, rebuilt(after(steps)));
         }
     }
@@ -391,7 +403,7 @@ private:
         std::vector<Edit> edits;
         uint32_t seed = run_.options.seed;
         for (const vec3 middle : cube_middles(scenes)) {
-            for (Edit& e : recipe(kind_, seed++, run_.options.count)) {
+            for (Edit& e : recipe(scene_.kind, seed++, run_.options.count)) {
                 e.node.transform.position = e.node.transform.position + middle;
                 edits.push_back(e);
             }
@@ -423,7 +435,7 @@ private:
     }
 
     uint64_t rebuilt(std::span<const Edit> edits) const {
-        return stored(made(program_of(edits), run_.options.resolution, 0)).checksum;
+        return stored(made(program_of(edits), scene_.options, 0)).checksum;
     }
 
     // ---- questions, of the baked bricks
@@ -503,7 +515,7 @@ private:
     void single() {
         run_.stage("query.single");
         const HostBricks& bricks = start();
-        const std::vector<vec3> points = random_points(kRandomPoints);
+        const std::vector<vec3> points = scene_.points(kRandomPoints);
         std::vector<float> out(points.size()), peer(points.size()), slow_way(points.size());
         std::vector<Contestant> turns{[&] {
             return seconds_of([&] {
@@ -540,7 +552,7 @@ private:
     void rays(int threads) {
         run_.stage("rays");
         const HostBricks& bricks = start();
-        const std::vector<Ray> list = picture_rays_in_tiles(kRayWidth, kRayHeight);
+        const std::vector<Ray> list = scene_.rays(kRayWidth, kRayHeight);
         std::vector<field::MarchHit> hits(list.size()), slow_way(list.size());
         constexpr int kPiece = 1024;
         const int pieces = (int(list.size()) + kPiece - 1) / kPiece;
@@ -590,7 +602,7 @@ private:
     void refined_rays(int threads) {
         run_.stage("rays.refined");
         const HostBricks& bricks = start();
-        const std::vector<Ray> list = picture_rays_in_tiles(kRayWidth, kRayHeight);
+        const std::vector<Ray> list = scene_.rays(kRayWidth, kRayHeight);
         std::vector<field::MarchHit> hits(list.size()), slow_way(list.size());
         constexpr int kPiece = 1024;
         const int pieces = (int(list.size()) + kPiece - 1) / kPiece;
@@ -614,24 +626,6 @@ private:
             },
             kPiece);
         run_.add_checked(out, checksum_of(hits), checksum_of(slow_way));
-    }
-
-    // Triangles of the smooth mesh and crossed lattice edges, each counted voxel by voxel. An edge is in four voxels, none of which lacks its
-    // brick: these scenes end inside the grid.
-    static std::pair<uint64_t, uint64_t> crossings(const HostBricks& bricks) {
-        uint64_t triangles = 0, edges = 0;
-        for (const uint32_t slot : bricks.field().slots()) {
-            for (int i = 0; i < 343; ++i) {
-                const int x = i % 7, y = i / 7 % 7, z = i / 49;
-                uint32_t solid = 0;
-                for (int c = 0; c < 8; ++c)
-                    solid |= uint32_t(bricks.texel(slot, x + (c & 1), y + (c >> 1 & 1), z + (c >> 2)) <= 0) << c;
-                const field::CellLoops& loops = field::cell_tables().loops[solid];
-                triangles += field::cell_tables().triangles[solid].count;
-                edges += loops.first[loops.count];
-            }
-        }
-        return {triangles, edges / 4};
     }
 
     void mesh(bool sharp, int threads) {
@@ -661,19 +655,38 @@ private:
         }
         constexpr double kVertexFlops = 20;  // operations that place a vertex on its edge
         out.roof_ratio = kVertexFlops * double(made.vertex_count()) / (roofs().flops * threads) / least[0];
-        // Two triangles a crossed edge and a late vertex, or a vertex an edge.
-        const auto [triangles, edges] = crossings(bricks);
-        const uint64_t quads = made.triangle_count() - 2 * made.late_bricks.size();
-        run_.add_checked(out, sharp ? hash_combine(quads, 0) : hash_combine(made.triangle_count(), made.vertex_count()),
-                         sharp ? hash_combine(2 * edges, 0) : hash_combine(triangles, edges));
+        if (!sharp) return run_.add_checked(out, checksum_of_triangles(made), smooth_mesh_by_voxel(bricks));
+        constexpr double kLooks =
+            80;  // ten times what a vertex asks of the exact field: every edit at a tenth of them is seconds
+        field::Mesh slow_way;
+        field::mesh_sharp(mesh_bricks, every_edit(bricks, mesh_bricks, stride_of(kLooks * double(made.vertex_count()))),
+                          slow_way);
+        run_.add_checked(out, checksum_of_bytes(made), checksum_of_bytes(slow_way));
     }
 
-    void memory() {
+    // Bytes a voxel of the band: of distances in either format, and of what stands beside them.
+    void memory_rows() {
+        if (wanted("memory.per_voxel")) memory("memory.per_voxel", start());
+        if (!wanted("memory.8_bit") && !wanted("memory.beside")) return;
+        field::FieldOptions options = scene_.options;
+        options.format = field::DistanceFormat::Snorm8;
+        if (wanted("memory.8_bit")) memory("memory.8_bit", made(scene_.program, options, 0));
+        if (!wanted("memory.beside")) return;
         run_.stage("memory");
         const HostBricks& bricks = start();
+        const double distances = double(bricks.field().slots().size()) * field::kBrickTexelCount * bricks.texel_bytes();
         const Stored mine = stored(bricks, stride_);
+        BenchRow out = row("memory.beside",
+                           (double(bricks.bytes()) - distances) / double(std::max<uint64_t>(slow().band_voxels, 1)) *
+                               double(mine.bricks) / double(std::max<size_t>(bricks.field().slots().size(), 1)),
+                           "B", 1);
+        run_.add_checked(out, mine.checksum, slow().checksum);
+    }
+    void memory(const char* name, const HostBricks& bricks) {
+        run_.stage("memory");
+        const Stored mine = stored(bricks, stride_), slow_way = brute_force(*scene_.program, bricks.field(), stride_);
         const double bytes = double(mine.bricks) * field::kBrickTexelCount * bricks.texel_bytes();
-        BenchRow out = row("memory.per_voxel", bytes / double(std::max<uint64_t>(slow().band_voxels, 1)), "B", 1);
+        BenchRow out = row(name, bytes / double(std::max<uint64_t>(slow_way.band_voxels, 1)), "B", 1);
         if (peer_grid() != nullptr) {
             uint64_t voxels = 0, size = 0;
             peers()->measure(peer_grid(), &voxels, &size);
@@ -682,13 +695,12 @@ private:
             anchor(out, "OpenVDB", 11.6);
         }
         out.roof_ratio = double(bricks.texel_bytes()) / out.value;
-        run_.add_checked(out, hash_combine(mine.checksum, mine.bricks), hash_combine(slow().checksum, slow().bricks));
+        run_.add_checked(out, hash_combine(mine.checksum, mine.bricks),
+                         hash_combine(slow_way.checksum, slow_way.bricks));
     }
 
     BenchRun& run_;
-    const int kind_;
-    const std::vector<Edit> edits_;
-    const std::shared_ptr<const sdf::Program> program_;
+    const BenchScene scene_;
     uint64_t stride_ = 1;
     bool anchored_ = false;
     std::unique_ptr<HostBricks> start_, wide_start_;
@@ -699,16 +711,24 @@ private:
 }  // namespace
 
 BenchFamily field_family() {
-    return {{"field",
-             "the field of 1000 spheres and boxes: building, editing, sampling, rays, meshes, memory",
-             {"bake",           "edit.mean",       "edit.worst",   "undo",           "edit.cold",       "edit.add",
-              "edit.smooth",    "edit.move",       "edit.remove",  "edit.among.10k", "edit.among.100k", "edit.among.1m",
-              "samples.random", "samples.band",    "query.single", "rays",           "rays.refined",    "mesh.smooth",
-              "mesh.sharp",     "memory.per_voxel"}},
-            [](BenchRun& run) {
-                for (const int kind : run.options.kinds)
-                    if (!run.fault()) FieldRows(run, kind).all();
-            }};
+    return {
+        {"field",
+         "the field of 1000 spheres and boxes: building, editing, sampling, rays, meshes, memory",
+         {"bake",           "edit.mean",        "edit.worst",   "undo",           "edit.cold",       "edit.add",
+          "edit.smooth",    "edit.move",        "edit.remove",  "edit.among.10k", "edit.among.100k", "edit.among.1m",
+          "samples.random", "samples.band",     "query.single", "rays",           "rays.refined",    "mesh.smooth",
+          "mesh.sharp",     "memory.per_voxel", "memory.8_bit", "memory.beside"}},
+        [](BenchRun& run) {
+            if (!run.options.scene.empty()) {
+                if (auto scene = file_scene(run.options))
+                    FieldRows(run, std::move(*scene)).all();
+                else
+                    run.fail(scene.error());
+                return;
+            }
+            for (const int kind : run.options.kinds)
+                if (!run.fault()) FieldRows(run, recipe_scene(kind, run.options)).all();
+        }};
 }
 
 }  // namespace kiln::measure

@@ -43,6 +43,8 @@ TEST(SelfCrossings, NeitherMesherHasAny) {
         mesh_smooth(bricks, smooth);
         mesh_sharp(bricks, exact_of(host, bricks), sharp);
         ASSERT_GT(smooth.triangle_count(), 1000u) << world.name;
+        meshes::expect_closed(smooth, world.name);
+        meshes::expect_closed(sharp, world.name);
         const float h = host.field().grid().voxel_size;
         const Crossings a = crossings(smooth, h), b = crossings(sharp, h);
         EXPECT_EQ(a.apart + a.at_vertex, 0u) << world.name;

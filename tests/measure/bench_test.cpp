@@ -83,8 +83,37 @@ TEST(Bench, EveryRowOfEveryKindEqualsTheSlowWay) {
         EXPECT_EQ(row.checksum.size(), 16u) << row.name;
         EXPECT_EQ(row.threads, 1) << row.name;
         EXPECT_FALSE(row.unit.empty()) << row.name;
+        const bool bakes = row.name == "bake" || row.name.starts_with("edit.") || row.name == "undo";
+        EXPECT_EQ(row.texels > 0, bakes && !row.name.starts_with("edit.among")) << row.name;
+        EXPECT_EQ(row.texels, uint64_t(row.bricks * 512 + 0.5)) << row.name;
         EXPECT_EQ(std::isfinite(row.ratio), !row.peer.empty()) << row.name;
     }
+}
+
+TEST(Bench, ASceneFromAFileIsAskedWhatARecipeIs) {
+    BenchOptions options = small({0});
+    options.scene = "orbit";
+    const std::vector<std::string> rows{"field/bake", "field/mesh.smooth", "field/mesh.sharp", "field/memory.8_bit"};
+    const auto report = run_bench(rows, options);
+    ASSERT_TRUE(report) << report.error().message;
+    EXPECT_EQ(report->rows.size(), 4u);
+    for (const BenchRow& row : report->rows) {
+        EXPECT_EQ(row.scene, "orbit");
+        EXPECT_GT(row.count, 20u);
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_TRUE(row.peer.empty()) << row.name;
+        EXPECT_EQ(row.name == "bake", row.texels > 0);
+    }
+    for (const std::string name : {"field/edit.add", "field/undo", "expression"}) {
+        const auto refused = run_bench(std::vector<std::string>{name}, options);
+        ASSERT_FALSE(refused) << name;
+        EXPECT_EQ(refused.error().kind, ErrorKind::Usage);
+        EXPECT_THAT(refused.error().message, HasSubstr("--scene"));
+    }
+    options.scene = "nowhere.kiln.json";
+    const auto missing = run_bench({}, options);
+    ASSERT_FALSE(missing);
+    EXPECT_EQ(missing.error().kind, ErrorKind::Input);
 }
 
 TEST(Bench, WhatTheJournalRowsDidReadsBackAsItWas) {
