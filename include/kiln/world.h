@@ -249,6 +249,18 @@ struct PlayCounts {
     int parts = 0;   ///< that have come loose since the start
 };
 
+/// What a ray meets of a play.
+struct PlayHit {
+    RayHit hit;
+    std::string body{};  ///< id of the body it belongs to; empty: of none
+};
+
+/// Who walks in a play (Play::enter).
+struct PlayWalker {
+    vec3 feet{};  ///< as far between the last two steps as frames are
+    bool on_floor = false;
+};
+
 /// A world's bodies, running, while the world itself stays as it is. It must outlive the play. Owner's thread.
 ///   auto play = kiln::Play::start(world);   play->advance(seconds);   renderer->render(*play->frame(camera));
 class Play {
@@ -289,6 +301,15 @@ public:
     Result<void> launch(Edit edit, vec3 velocity);
     /// What a ray meets of the world as the last frame showed it, bodies among it.
     Result<RayHit> cast(const Ray& ray);
+    /// The same, bodies of meshes among it, and whose it is: the target of commands that act there.
+    Result<PlayHit> pick(const Ray& ray);
+    /// Somebody walks in it, as characters of scenes do, and is not seen: from `feet` on, 1.7 m tall. Whoever did before is gone.
+    Result<void> enter(vec3 feet);
+    /// What they wish until the next time: a velocity, of which the level part counts, and once, where they stand, the speed upwards of a
+    /// jump (m/s). Nothing while nobody walks.
+    void walk(vec3 velocity, float jump = 0);
+    void leave();
+    std::optional<PlayWalker> walker() const;
     PlayCounts counts() const;
 
 private:
@@ -311,6 +332,8 @@ std::vector<PhysicsBackend> physics_backends();
 
 /// Names and one-line descriptions of the scenes that come with Kiln.
 std::vector<std::pair<std::string, std::string>> bundled_scenes();
+/// Whether World::load() takes this for the name of a bundled scene: a word that no file here has for its name.
+bool is_bundled_scene(const std::string& path_or_name);
 /// How two scenes differ, by the ids of their edits (`kiln diff`): JSON, or lines for people.
 struct SceneDifference {
     bool equal = true;

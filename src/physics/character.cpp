@@ -28,6 +28,12 @@ Result<Character> Character::make(World& world, const CharacterSettings& setting
     if (!body) return body.error();
     out.body_ = *body;
     out.position_ = position;
+    out.fall_ = settings.fall;
+    if (settings.fall == 0) {
+        std::optional<BodyHit> hit;
+        (void)out.go(position, {0, -2 * kSkin, 0}, &hit);
+        if (hit && out.holds(*hit)) out.floor_ = hit;
+    }
     return out;
 }
 

@@ -16,6 +16,7 @@ struct CharacterSettings {
     float step_height = 0.3f;   ///< what it steps onto, metres
     float steepest_deg = 50;    ///< of a floor that it stands on
     vec3 gravity{0, -9.81f, 0};
+    float fall = 0;  ///< vertical speed at the start, m/s; at 0 it stands where there is a floor under its feet
 };
 
 /// Owner's thread, between steps. The world must outlive it, or forget it first (leave()).
@@ -30,7 +31,8 @@ public:
     void leave() { world_->remove(body_); }
 
     vec3 position() const { return position_; }
-    vec3 velocity() const { return velocity_; }  ///< of the last move, what carries it included
+    vec3 velocity() const { return velocity_; }        ///< of the last move, what carries it included
+    float fall() const { return floor_ ? 0 : fall_; }  ///< its own vertical speed, m/s
     bool on_floor() const { return floor_.has_value(); }
     BodyId floor() const { return floor_ ? floor_->body : BodyId{}; }  ///< what it stands on
     BodyId body() const { return body_; }

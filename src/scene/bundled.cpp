@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <sys/stat.h>
 
 namespace kiln::scene {
 
@@ -17,11 +18,19 @@ namespace {
 
 std::span<const BundledScene> bundled_files() { return kBundled; }
 
-bool is_bundled(std::string_view scene) {
+namespace {
+
+bool is_name(std::string_view scene) {
     return std::any_of(std::begin(kBundled), std::end(kBundled), [&](const auto& row) { return row.name == scene; });
 }
 
-std::span<const unsigned char> bundled_model(std::string_view scene, std::string_view file) {
+}  // namespace
+
+bool is_bundled(const SceneData& scene) {
+    return scene.folder.empty() && !scene.source.empty() && is_name(scene.source.name());
+}
+
+std::span<const unsigned char> bundled_model(const SceneData& scene, std::string_view file) {
     if (!is_bundled(scene)) return {};
     const auto found =
         std::find_if(std::begin(kModels), std::end(kModels), [&](const auto& row) { return row.name == file; });
@@ -31,6 +40,11 @@ std::span<const unsigned char> bundled_model(std::string_view scene, std::string
 }  // namespace kiln::scene
 
 namespace kiln {
+
+bool is_bundled_scene(const std::string& path_or_name) {
+    struct stat info {};
+    return scene::is_name(path_or_name) && ::stat(path_or_name.c_str(), &info) != 0;
+}
 
 std::string_view version() { return scene::kVersion; }
 

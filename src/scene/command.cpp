@@ -3,6 +3,7 @@
 
 #include "scene/command.h"
 
+#include "scene/read_bodies.h"
 #include "scene/read_nodes.h"
 #include "scene/read_values.h"
 
@@ -12,8 +13,8 @@ namespace kiln::scene {
 
 namespace {
 
-constexpr std::string_view kKeys[] = {"add",     "change", "remove", "reorder",     "materials",
-                                      "objects", "field",  "lights", "environment", "cameras"};
+constexpr std::string_view kKeys[] = {"add",    "change",      "remove",  "reorder", "materials", "objects",   "field",
+                                      "lights", "environment", "cameras", "meshes",  "bodies",    "characters"};
 
 class CommandReader {
 public:
@@ -78,6 +79,10 @@ private:
         case CommandKind::Environment:
         case CommandKind::Cameras:
             break;
+        case CommandKind::Meshes:
+        case CommandKind::Bodies:
+        case CommandKind::Characters:
+            return bodies(what);
         }
         return doc_.is(what, JsonType::Null) && out_.kind == CommandKind::Environment ? true : section(at, what);
     }
@@ -126,6 +131,32 @@ private:
         }
         out_.stage = std::move(part.stage);
         return true;
+    }
+
+    // What the world has beside its edits, as one of these sections is to have it now.
+    bool bodies(JsonIndex at) {
+        if (!in_.value(at, *find_row(kSceneTable, doc_.key(at)), nullptr)) return false;
+        Ids own;
+        if (!read_ids(in_, at, own)) return false;
+        const auto ids_of = [](const auto& list) {
+            Ids out;
+            for (uint32_t i = 0; i < list.size(); ++i) out.emplace(list[i].id, i);
+            return out;
+        };
+        const SceneData& scene = *names_.scene;
+        const BodyNames names{names_.materials,
+                              [&](std::string_view name) { return names_.edit(name) != nullptr; },
+                              {},
+                              ids_of(scene.meshes),
+                              ids_of(scene.bodies),
+                              ids_of(scene.characters)};
+        if (out_.kind == CommandKind::Characters) return read_characters(in_, at, names, out_.characters);
+        if (out_.kind == CommandKind::Bodies) return read_bodies(in_, at, names, out_.bodies);
+        for (const SceneBody& body : scene.bodies)
+            if (!body.mesh.empty() && !own.contains(body.mesh))
+                return in_.fail(at,
+                                formatted("the mesh \"{}\" is body \"{}\"; take that away first", body.mesh, body.id));
+        return read_meshes(in_, at, names, out_.meshes);
     }
 
     const JsonDocument& doc_;

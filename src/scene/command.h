@@ -4,6 +4,7 @@
 //   {"add": EDIT, "before": ID}       {"change": EDIT, "was": ID}     {"remove": ID}     {"reorder": ID, "before": ID}
 //   {"materials": {NAME: MATERIAL}}   {"objects": {NAME: TREE}}       null takes the last one away again
 //   {"field": …}  {"lights": […]}  {"environment": … or null}  {"cameras": {…}}          the whole section
+//   {"meshes": […]}  {"bodies": […]}  {"characters": […]}                                likewise
 #pragma once
 
 #include "scene/scene_file.h"
@@ -15,6 +16,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace kiln::scene {
 
@@ -28,7 +30,10 @@ enum class CommandKind : uint8_t {
     Field,
     Lights,
     Environment,
-    Cameras
+    Cameras,
+    Meshes,
+    Bodies,
+    Characters
 };
 /// The key that says which it is: "add", …, "materials", ….
 std::string_view command_key(CommandKind kind);
@@ -42,6 +47,9 @@ struct Command {
     std::optional<Material> material;  ///< none: taken away
     std::optional<Object> object;      ///< none: taken away
     SceneData::Stage stage;            ///< the section of Field, Lights, Environment or Cameras
+    std::vector<SceneMesh> meshes{};   ///< Meshes, Bodies, Characters
+    std::vector<SceneBody> bodies{};
+    std::vector<SceneCharacter> characters{};
 };
 
 /// What the names in a command mean.
@@ -49,6 +57,7 @@ struct CommandNames {
     const NameNumbers& materials;
     const NameNumbers& objects;
     std::function<const Edit*(std::string_view)> edit;  ///< null: there is none
+    const SceneData* scene = nullptr;                   ///< whose meshes, bodies and characters are meant
 };
 
 /// Errors are those of scenes: "NAME:LINE:COLUMN: add.radius: what; what would be right".

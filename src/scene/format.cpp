@@ -48,6 +48,7 @@ constexpr std::string_view kBloomKinds[] = {"pyramid", "gaussian"};
 constexpr std::string_view kAxes[] = {"x", "y", "z"};
 constexpr std::string_view kMotions[] = {"static", "kinematic", "dynamic"};
 constexpr std::string_view kCollisions[] = {"convex", "triangles"};
+constexpr std::string_view kSurfaces[] = {"own", "materials"};
 constexpr uint8_t kSun = 1, kBulbs = 6, kSpot = 4, kAimed = 5;
 
 constexpr KeyRow kBoundsRows[] = {
@@ -190,6 +191,8 @@ constexpr KeyRow kBodyRows[] = {
     numbers("angular_velocity", 3, KILN_AT(SceneBody::Numbers, angular_velocity), {0, 0, 0}, "rad/s", "any",
             "at the start"),
     number("rolling_friction", KILN_AT(SceneBody::Numbers, rolling_friction), 0, "1", ">= 0", "of its surface"),
+    choice("surface", kSurfaces, "its own, or that of its materials where they say what it is; left out: own"),
+    plain("settles", KeyType::Bool, "becomes ground where it has slept for two seconds, as what is cut loose does"),
 };
 constexpr KeyRow kTriggerRows[] = {
     needed(plain("id", KeyType::Text, "unique name")),
@@ -213,6 +216,8 @@ constexpr KeyRow kCharacterRows[] = {
     number("step_height", KILN_AT(SceneCharacter::Numbers, step_height), 0.3f, "m", ">= 0", "that it steps onto"),
     number("steepest_deg", KILN_AT(SceneCharacter::Numbers, steepest_deg), 50, "deg", "[0, 89]",
            "of a floor that it stands on"),
+    numbers("linear_velocity", 3, KILN_AT(SceneCharacter::Numbers, linear_velocity), {0, 0, 0}, "m/s", "any",
+            "at the start; it is what it falls or rises with"),
     inside("path", KeyType::List, kWishTable, "what it wishes, by time; each holds until the next"),
 };
 constexpr KeyRow kClothRows[] = {

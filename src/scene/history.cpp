@@ -41,7 +41,16 @@ void Log::lose_sequences() {
 }
 
 void Log::lose_places() {
-    for (Change& change : changes) change.place = SceneData::kNowhere;
+    const auto of = [](auto* list) {
+        if (list != nullptr)
+            for (auto& item : *list) item.place = SceneData::kNowhere;
+    };
+    for (Change& change : changes) {
+        change.place = SceneData::kNowhere;
+        of(change.get<std::vector<SceneMesh>>());
+        of(change.get<std::vector<SceneBody>>());
+        of(change.get<std::vector<SceneCharacter>>());
+    }
 }
 
 }  // namespace kiln::scene

@@ -19,13 +19,27 @@
 namespace kiln::scene {
 
 struct Change {
-    enum class What : uint8_t { Presence, Content, Order, Material, Object, Field, Lights, Environment, Cameras };
+    enum class What : uint8_t {
+        Presence,
+        Content,
+        Order,
+        Material,
+        Object,
+        Meshes,
+        Bodies,
+        Characters,
+        Field,
+        Lights,
+        Environment,
+        Cameras
+    };
     using Cameras = std::vector<std::pair<std::string, Camera>>;
     /// Nothing: the thing is there now and would be away, or (Order) has no content of its own.
-    using Held =
-        std::variant<std::monostate, std::unique_ptr<Edit>, std::unique_ptr<std::pair<std::string, Material>>,
-                     std::unique_ptr<Object>, std::unique_ptr<FieldSettings>, std::unique_ptr<std::vector<Light>>,
-                     std::unique_ptr<std::optional<Environment>>, std::unique_ptr<Cameras>>;
+    using Held = std::variant<std::monostate, std::unique_ptr<Edit>, std::unique_ptr<std::pair<std::string, Material>>,
+                              std::unique_ptr<Object>, std::unique_ptr<FieldSettings>,
+                              std::unique_ptr<std::vector<Light>>, std::unique_ptr<std::optional<Environment>>,
+                              std::unique_ptr<Cameras>, std::unique_ptr<std::vector<SceneMesh>>,
+                              std::unique_ptr<std::vector<SceneBody>>, std::unique_ptr<std::vector<SceneCharacter>>>;
 
     What what = What::Presence;
     JsonIndex place = SceneData::kNowhere;  ///< of an edit that is away

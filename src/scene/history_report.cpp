@@ -38,6 +38,12 @@ std::string words_of(const World::Impl& m, const Change& change, bool done) {
         if (change.id.index < m.data.objects.size()) return "object " + m.data.objects[change.id.index].name;
         if (const Object* const away = change.get<Object>()) return "object " + away->name;
         return formatted("object #{}", change.id.index);
+    case What::Meshes:
+        return "meshes";
+    case What::Bodies:
+        return "bodies";
+    case What::Characters:
+        return "characters";
     case What::Field:
         return "field";
     case What::Lights:

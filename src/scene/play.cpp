@@ -119,7 +119,7 @@ struct Play::Session {
     Result<void> keep(const scene::Simulation& simulation) {
         if (!open) return Error{"playing: it has ended already; begin another", ErrorKind::Usage};
         if (auto done = tell(simulation); !done) return done;
-        if (auto done = simulation.keep_poses(*world); !done) return done;
+        if (auto done = simulation.keep_motion(*world); !done) return done;
         if (auto done = world->history().end_group(); !done) return done;
         open = false;
         return {};
@@ -211,6 +211,11 @@ Result<Frame> Play::frame(const Camera& camera, const PlayLines& lines, const Fr
 
 Result<void> Play::launch(Edit edit, vec3 velocity) { return simulation_->launch(std::move(edit), velocity); }
 Result<RayHit> Play::cast(const Ray& ray) { return simulation_->cast(ray); }
+Result<PlayHit> Play::pick(const Ray& ray) { return simulation_->pick(ray); }
+Result<void> Play::enter(vec3 feet) { return simulation_->enter(feet); }
+void Play::walk(vec3 velocity, float jump) { simulation_->wish(velocity, jump); }
+void Play::leave() { simulation_->leave(); }
+std::optional<PlayWalker> Play::walker() const { return simulation_->visitor(between_); }
 PlayCounts Play::counts() const { return simulation_->counts(); }
 
 }  // namespace kiln

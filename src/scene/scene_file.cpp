@@ -4,13 +4,12 @@
 #include "scene/scene_file.h"
 
 #include "scene/format.h"
+#include "scene/read_bodies.h"
 #include "scene/read_nodes.h"
 #include "scene/read_values.h"
 
 #include "base/format.h"
 #include "field/level_cells.gpu.h"
-#include "model/triangles.h"
-#include "physics/physics.h"
 
 #include <bit>
 #include <cmath>
@@ -178,137 +177,38 @@ private:
         return true;
     }
 
-    // Ids of a list, each once.
-    bool ids(std::string_view list, std::unordered_map<std::string_view, uint32_t>& out) {
+    bool ids(std::string_view list, Ids& out) {
         const auto at = section(list);
         if (!at) return true;
         // Bodies show their edits.
         const bool drawn = list == "meshes" || list == "bodies";
         if (!drawn && doc_.first(*at) != doc_.next(*at)) scene_.undrawn.emplace_back(list);
-        uint32_t n = 0;
-        for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c), ++n) {
-            const JsonIndex id = *doc_.find(c, "id");
-            if (doc_.text(id).empty()) return in_.fail(id, "an empty id; give it a name");
-            if (const auto [old, fresh] = out.emplace(doc_.text(id), n); !fresh)
-                return in_.fail(id,
-                                formatted("{}[{}] has this id too; ids are unique, choose another", list, old->second));
-        }
-        return true;
-    }
-
-    bool mesh(JsonIndex at, SceneMesh& out) {
-        out.place = at;
-        out.id = doc_.text(*doc_.find(at, "id"));
-        const JsonIndex file = *doc_.find(at, "file");
-        out.file = doc_.text(file);
-        if (out.file.empty())
-            return in_.fail(file, formatted("an empty file name; name a model, ending in {}", model::kModelEndings));
-        Transform& t = out.transform;
-        if (const auto v = doc_.find(at, "position"))
-            if (!in_.numbers(*v, find_row(kMeshTable, "position")->numbers, &t.position.x)) return false;
-        if (const auto v = doc_.find(at, "rotation"); v && !in_.rotation(*v, &t.rotation)) return false;
-        if (const auto v = doc_.find(at, "scale"); v && !in_.scale(*v, &t.scale)) return false;
-        if (const auto v = doc_.find(at, "hidden")) out.hidden = doc_.is(*v, JsonType::True);
-        if (const auto v = doc_.find(at, "outline"))
-            return in_.table(*v, kOutlineTable, &out.outline.emplace().color.x);
-        return true;
-    }
-
-    bool character(JsonIndex at, const std::unordered_map<std::string_view, uint32_t>& bodies) {
-        SceneCharacter out;
-        const JsonIndex id = *doc_.find(at, "id");
-        out.id = doc_.text(id);
-        out.place = at;
-        // Events tell of both.
-        if (bodies.contains(out.id)) return in_.fail(id, "a body has this id too; choose another");
-        if (!in_.table(at, kCharacterTable, &out.numbers.position.x)) return false;
-        if (const auto h = doc_.find(at, "height"); !(out.numbers.height > 2 * out.numbers.radius))
-            return in_.fail(h ? *h : at,
-                            formatted("a height of {} is not above twice the radius, {}; make one larger or the other "
-                                      "smaller",
-                                      shortest(out.numbers.height), shortest(2 * out.numbers.radius)));
-        if (const auto path = doc_.find(at, "path")) {
-            for (JsonIndex c = doc_.first(*path); c < doc_.next(*path); c = doc_.next(c)) {
-                SceneCharacter::Wish wish;
-                if (!in_.table(c, kWishTable, &wish.time)) return false;
-                if (!out.path.empty() && wish.time < out.path.back().time)
-                    return in_.fail(*doc_.find(c, "time"),
-                                    formatted("{} is before the wish above, {}; list wishes by ascending time",
-                                              shortest(wish.time), shortest(out.path.back().time)));
-                out.path.push_back(wish);
-            }
-        }
-        scene_.characters.push_back(std::move(out));
-        return true;
+        return read_ids(in_, *at, out);
     }
 
     bool later_sections() {
-        std::unordered_map<std::string_view, uint32_t> meshes, bodies, triggers, characters, cloths, fluids, edit_ids,
-            object_names;
-        if (!ids("meshes", meshes) || !ids("bodies", bodies) || !ids("triggers", triggers) ||
-            !ids("characters", characters) || !ids("cloths", cloths) || !ids("fluids", fluids))
-            return false;
-        // The ground is a body too.
-        if (const size_t count = bodies.size() + characters.size(); count >= physics::World::kMostBodies)
-            return in_.fail(*section(bodies.empty() ? "characters" : "bodies"),
-                            formatted("{} bodies and characters; there is room for {}, leave some out", count,
-                                      physics::World::kMostBodies - 1));
-        const auto known = [](const auto& map) {
+        Ids edit_ids, triggers, cloths, fluids, object_names;
+        for (uint32_t i = 0; i < scene_.edits.size(); ++i) edit_ids.emplace(scene_.edits[i].name, i);
+        const auto known = [](const Ids& map) {
             std::vector<std::string_view> names;
             for (const auto& [name, n] : map) names.push_back(name);
             std::sort(names.begin(), names.end());
             return names;
         };
-        if (const auto at = section("meshes")) {
-            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
-                SceneMesh mesh;
-                if (!this->mesh(c, mesh)) return false;
-                if (const auto m = doc_.find(c, "material")) {
-                    if (!scene_.material_numbers.contains(doc_.text(*m)))
-                        return in_.unknown_name(*m, "material", known(scene_.material_numbers));
-                    mesh.material = doc_.text(*m);
-                }
-                scene_.meshes.push_back(std::move(mesh));
-            }
-        }
+        BodyNames names{scene_.material_numbers,
+                        [&](std::string_view name) { return edit_ids.contains(name); },
+                        [&] { return known(edit_ids); },
+                        {},
+                        {},
+                        {}};
+        Ids characters;  // of which bodies are not asked: what is read later is at fault
+        if (!ids("meshes", names.meshes) || !ids("bodies", names.bodies) || !ids("triggers", triggers) ||
+            !ids("characters", characters) || !ids("cloths", cloths) || !ids("fluids", fluids))
+            return false;
+        if (const auto at = section("meshes"); at && !read_meshes(in_, *at, names, scene_.meshes)) return false;
         if (const auto at = section("physics"); at && !in_.table(*at, kPhysicsTable, &scene_.physics.gravity.x))
             return false;
-        std::unordered_map<std::string_view, std::string_view> owners;  // bodies by edit
-        if (const auto at = section("bodies")) {
-            for (uint32_t i = 0; i < scene_.edits.size(); ++i) edit_ids.emplace(scene_.edits[i].name, i);
-            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
-                const auto edits = doc_.find(c, "edits"), mesh = doc_.find(c, "mesh");
-                if (bool(edits) == bool(mesh))
-                    return in_.fail(c, "a body has either \"edits\" or a \"mesh\"; give it one of them");
-                if (mesh && !meshes.contains(doc_.text(*mesh))) return in_.unknown_name(*mesh, "mesh", known(meshes));
-                SceneBody body;
-                body.id = doc_.text(*doc_.find(c, "id"));
-                body.place = c;
-                if (!in_.table(c, kBodyTable, &body.numbers.density)) return false;
-                if (const auto m = doc_.find(c, "motion")) {
-                    int motion = 0;
-                    if (!in_.choice(*m, kMotionNames, &motion)) return false;
-                    body.motion = SceneBody::Motion(motion);
-                }
-                if (mesh) body.mesh = doc_.text(*mesh);
-                if (const auto v = doc_.find(c, "collision");
-                    v && mesh && doc_.text(*v) == "triangles" && body.motion != SceneBody::Motion::Static)
-                    return in_.fail(*v, "\"triangles\" stand still; make the motion \"static\", or say \"convex\"");
-                if (const auto v = doc_.find(c, "continuous")) body.continuous = doc_.is(*v, JsonType::True);
-                if (edits && doc_.first(*edits) == doc_.next(*edits))
-                    return in_.fail(*edits, "no edits; name at least one");
-                for (JsonIndex e = edits ? doc_.first(*edits) : 0; edits && e < doc_.next(*edits); e = doc_.next(e)) {
-                    if (!edit_ids.contains(doc_.text(e))) return in_.unknown_name(e, "edit", known(edit_ids));
-                    if (const auto [owner, fresh] = owners.emplace(doc_.text(e), doc_.text(*doc_.find(c, "id")));
-                        !fresh)
-                        return in_.fail(
-                            e, formatted("the edit \"{}\" is body \"{}\" already; an edit belongs to one body, once",
-                                         doc_.text(e), owner->second));
-                    body.edits.emplace_back(doc_.text(e));
-                }
-                scene_.bodies.push_back(std::move(body));
-            }
-        }
+        if (const auto at = section("bodies"); at && !read_bodies(in_, *at, names, scene_.bodies)) return false;
         if (const auto at = section("triggers")) {
             for (uint32_t i = 0; i < scene_.objects.size(); ++i) object_names.emplace(scene_.objects[i].name, i);
             for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c)) {
@@ -323,10 +223,8 @@ private:
                 scene_.triggers.push_back(std::move(trigger));
             }
         }
-        if (const auto at = section("characters"))
-            for (JsonIndex c = doc_.first(*at); c < doc_.next(*at); c = doc_.next(c))
-                if (!character(c, bodies)) return false;
-        return true;
+        const auto at = section("characters");
+        return !at || read_characters(in_, *at, names, scene_.characters);
     }
 
     SceneData& scene_;

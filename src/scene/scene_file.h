@@ -33,6 +33,7 @@ struct ScenePhysics {
 
 /// An entry of "bodies".
 struct SceneBody {
+    static constexpr JsonIndex kNowhere = UINT32_MAX;
     struct Numbers {
         float density = 1000, friction = 0.5f, restitution = 0, linear_damping = 0, angular_damping = 0;
         vec3 linear_velocity{}, angular_velocity{};
@@ -45,7 +46,10 @@ struct SceneBody {
     Motion motion = Motion::Dynamic;
     bool continuous = false;
     Numbers numbers;
-    JsonIndex place = 0;
+    JsonIndex place = kNowhere;
+    std::string collision{};    ///< as the file says it
+    bool of_materials = false;  ///< its surface is that of its materials, where they say what it is
+    bool settles = false;       ///< it becomes ground where it has slept for a while, as what was cut loose does
 };
 
 /// An entry of "triggers".
@@ -61,6 +65,7 @@ struct SceneCharacter {
     struct Numbers {
         vec3 position{};  ///< of its feet
         float radius = 0.3f, height = 1.7f, speed = 1.5f, step_height = 0.3f, steepest_deg = 50;
+        vec3 linear_velocity{};  ///< at the start
     };
     struct Wish {
         float time = 0;
@@ -70,7 +75,7 @@ struct SceneCharacter {
     std::string id;
     Numbers numbers;
     std::vector<Wish> path;  ///< by ascending time
-    JsonIndex place = 0;
+    JsonIndex place = SceneBody::kNowhere;
 };
 
 /// An entry of "meshes". Saving keeps it as its file has it.
@@ -79,8 +84,9 @@ struct SceneMesh {
     std::string material;  ///< of the scene, instead of the file's; empty: the file's own
     Transform transform;
     bool hidden = false;
-    JsonIndex place = 0;
+    JsonIndex place = SceneBody::kNowhere;
     std::optional<Outline> outline{};
+    std::string group{};
 };
 
 /// A scene as data. `source` is the document it came from (empty for worlds made by code): saving keeps its key order, its

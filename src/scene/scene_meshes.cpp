@@ -34,8 +34,7 @@ SceneMeshes load_meshes(const SceneData& scene) {
         auto known = files.find(mesh.file);
         if (known == files.end()) {
             const std::string path = mesh.file.starts_with('/') ? mesh.file : scene.folder + mesh.file;
-            const auto bundled =
-                scene.folder.empty() ? bundled_model(scene.source.name(), mesh.file) : std::span<const unsigned char>{};
+            const auto bundled = bundled_model(scene, mesh.file);
             auto read = bundled.empty()
                             ? model::read_drawable(path)
                             : model::parse_gltf_drawable(
@@ -48,8 +47,13 @@ SceneMeshes load_meshes(const SceneData& scene) {
             }
         }
         if (!known->second) {
-            const auto at = scene.source.find(mesh.place, "file");
-            out.faults.push_back(scene.source.error(at ? *at : mesh.place, known->second.error().message).message);
+            const std::string& why = known->second.error().message;
+            if (mesh.place == SceneData::kNowhere) {
+                out.faults.push_back(mesh.id + ": " + why);
+            } else {
+                const auto at = scene.source.find(mesh.place, "file");
+                out.faults.push_back(scene.source.error(at ? *at : mesh.place, why).message);
+            }
             out.models.emplace_back();
             continue;
         }

@@ -66,7 +66,10 @@ public:
         case CommandKind::Field:
         case CommandKind::Lights:
         case CommandKind::Cameras:
-            whole_ = true;
+        case CommandKind::Meshes:
+        case CommandKind::Bodies:
+        case CommandKind::Characters:
+            whole_ = plain_ = true;
             section(key, kNowhere);
             break;
         case CommandKind::Environment:
@@ -147,6 +150,12 @@ private:
             environment(at);
         } else if (key == "cameras") {
             named(key, at, stage_.cameras, [&](const Camera& c, JsonIndex was) { camera(c, was); });
+        } else if (key == "meshes") {
+            listed(key, at, scene_.meshes, kMeshTable, [&](auto&... of) { mesh_key(of...); });
+        } else if (key == "bodies") {
+            listed(key, at, scene_.bodies, kBodyTable, [&](auto&... of) { body_key(of...); });
+        } else if (key == "characters") {
+            listed(key, at, scene_.characters, kCharacterTable, [&](auto&... of) { character_key(of...); });
         } else {
             keep(key, stood);
         }
@@ -237,6 +246,89 @@ private:
             }
             out_.close();
             if (known) was = old_.next(was);
+        }
+        out_.close();
+    }
+
+    // A section of things with ids, each with the keys of its table.
+    template <typename T, typename WriteKey>
+    void listed(std::string_view section, JsonIndex at, const std::vector<T>& items, const Table& table,
+                WriteKey write) {
+        if (!whole_ && at == kNowhere && items.empty()) return;
+        out_.open(JsonType::Array, section);
+        for (const T& item : items) {
+            out_.open(JsonType::Object);
+            for (const auto& [key, was] : members(plain_ ? kNowhere : item.place, table)) {
+                const KeyRow& row = *find_row(table, key);
+                if (key == "id") {
+                    out_.add_text(item.id, key);
+                } else {
+                    write(item, row, was);
+                }
+            }
+            out_.close();
+        }
+        out_.close();
+    }
+    void list_of_names(std::string_view key, const std::vector<std::string>& names) {
+        out_.open(JsonType::Array, key);
+        for (const std::string& name : names) out_.add_text(name);
+        out_.close();
+    }
+    void outline(JsonIndex at, const std::optional<Outline>& outline) {
+        if (!outline) return;
+        out_.open(JsonType::Object, "outline");
+        for (const auto& [k, w] : members(at, kOutlineTable))
+            number_row(*find_row(kOutlineTable, k), w, &outline->color.x);
+        out_.close();
+    }
+
+    void mesh_key(const SceneMesh& mesh, const KeyRow& row, JsonIndex was) {
+        const std::string_view key = row.name;
+        const Transform& t = mesh.transform;
+        const auto put = [&](const float* v, int count, bool is_default) {
+            if (was != kNowhere || !is_default) numbers(key, was, v, count);
+        };
+        if (key == "file") out_.add_text(mesh.file, key);
+        if (key == "position") put(&t.position.x, 3, t.position == vec3{});
+        if (key == "rotation") put(&t.rotation.x, 4, t.rotation == quat{});
+        if (key == "scale") put(&t.scale.x, 3, t.scale == vec3{1, 1, 1});
+        if (key == "material") text(key, was, mesh.material, "");
+        if (key == "hidden") flag(key, was, mesh.hidden);
+        if (key == "group") text(key, was, mesh.group, "");
+        if (key == "outline") outline(was, mesh.outline);
+    }
+
+    void body_key(const SceneBody& body, const KeyRow& row, JsonIndex was) {
+        const std::string_view key = row.name;
+        if (row.type == KeyType::Numbers) number_row(row, was, &body.numbers.density);
+        if (key == "edits" && body.mesh.empty()) list_of_names(key, body.edits);
+        if (key == "mesh" && !body.mesh.empty()) out_.add_text(body.mesh, key);
+        if (key == "collision" && !body.collision.empty()) out_.add_text(body.collision, key);
+        if (key == "motion") text(key, was, kMotionNames[size_t(body.motion)], "dynamic");
+        if (key == "continuous") flag(key, was, body.continuous);
+        if (key == "surface") text(key, was, body.of_materials ? "materials" : "own", "own");
+        if (key == "settles") flag(key, was, body.settles);
+    }
+
+    void character_key(const SceneCharacter& character, const KeyRow& row, JsonIndex was) {
+        if (row.type == KeyType::Numbers) number_row(row, was, &character.numbers.position.x);
+        if (row.name != "path" || (was == kNowhere && character.path.empty())) return;
+        out_.open(JsonType::Array, row.name);
+        JsonIndex stood = was == kNowhere ? kNowhere : old_.first(was);
+        for (const SceneCharacter::Wish& wish : character.path) {
+            const bool known = stood != kNowhere && stood < old_.next(was);
+            out_.open(JsonType::Object);
+            for (const auto& [k, w] : members(known ? stood : kNowhere, kWishTable)) {
+                const KeyRow& number = *find_row(kWishTable, k);
+                // Its time is always said.
+                if (number.required)
+                    out_.add_float(*(&wish.time + number.numbers.offset), k);
+                else
+                    number_row(number, w, &wish.time);
+            }
+            out_.close();
+            if (known) stood = old_.next(stood);
         }
         out_.close();
     }
@@ -348,13 +440,7 @@ private:
         if (edit && key == "dynamic") return flag(key, at, edit->dynamic);
         if (edit && key == "hidden") return flag(key, at, edit->hidden);
         if (edit && key == "group") return text(key, at, edit->group, "");
-        if (edit && key == "outline") {
-            if (!edit->outline) return;
-            out_.open(JsonType::Object, key);
-            for (const auto& [k, w] : members(at, kOutlineTable))
-                number_row(*find_row(kOutlineTable, k), w, &edit->outline->color.x);
-            return out_.close();
-        }
+        if (edit && key == "outline") return outline(at, edit->outline);
         if (node.kind == Node::Kind::Shape)
             parameter(key, at, sdf::shape_rows()[node.shape.kind], node.shape.params.data());
     }

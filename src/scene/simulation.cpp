@@ -60,7 +60,7 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
 
 Error Simulation::fault(JsonIndex place, const std::string& id, const std::string& message) const {
     const SceneData& data = start_.impl_->data;
-    if (data.source.empty()) return {id + ": " + message, ErrorKind::Input};
+    if (data.source.empty() || place == SceneData::kNowhere) return {id + ": " + message, ErrorKind::Input};
     return data.source.error(place, message);
 }
 
@@ -160,9 +160,15 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
                     s.shape = std::get<std::shared_ptr<const physics::SdfShape>>(s.shape)->with(*mass);
             }
         }
+        if (body.of_materials) s.surfaces = surfaces_of(impl.data);
         if (auto added = add(s, body.id); !added) return wrong(added.error().message);
         members_.back().edits = std::move(edits);
         if (!body.edits.empty()) members_.back().edit = body.edits.front();
+        if (!body.settles) continue;
+        auto own = field_of(impl, members_.back().edits);
+        if (!own) return wrong(own.error().message);
+        loose_.push_back(
+            {members_.size() - 1, *impl.edits[impl.edits.find(body.edits.front())].edit, (*own)->bounds()});
     }
     return {};
 }
@@ -244,8 +250,10 @@ Result<World*> Simulation::live() {
 
 std::optional<std::string> Simulation::changed_body() const {
     const EditList &before = start_.impl_->edits, &after = live_->impl_->edits;
-    for (const SceneBody& body : start_.impl_->data.bodies) {
-        for (const std::string& name : body.edits) {
+    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
+    for (size_t i = 0; i < bodies.size(); ++i) {
+        if (members_[i].rest) continue;  // it is ground
+        for (const std::string& name : bodies[i].edits) {
             const uint32_t had = before.find(name), has = after.find(name);
             const auto own = own_.find(name);
             const Edit* expected = own != own_.end()        ? &own->second

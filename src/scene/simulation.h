@@ -38,8 +38,8 @@ public:
     Result<void> keep(World& world) const;
     /// The commands that have led from the start to the ground and the parts of now, in order; it grows.
     const std::vector<std::string>& made() const { return made_; }
-    /// Puts what moves in a world that has taken all of them where it is.
-    Result<void> keep_poses(World& world) const;
+    /// Makes what moves in a world that has taken all of them start where it is now, as fast as it is now (simulation_keep.cpp).
+    Result<void> keep_motion(World& world) const;
     /// Parts too small to be bodies that have come loose; pictures show them fall.
     int crumbs() const { return crumb_count_; }
     /// The world with its bodies between where they were before the last step (0) and where they are (1).
@@ -48,6 +48,11 @@ public:
     // For whoever plays (simulation_launch.cpp).
     Result<void> launch(Edit edit, vec3 velocity);
     Result<RayHit> cast(const Ray& ray);
+    Result<PlayHit> pick(const Ray& ray);
+    Result<void> enter(vec3 feet);
+    void wish(vec3 velocity, float jump);
+    void leave();
+    std::optional<PlayWalker> visitor(float between) const;
     PlayCounts counts() const;
 
     const physics::World& world() const { return *world_; }
@@ -95,6 +100,9 @@ public:
 private:
     explicit Simulation(const World& start) : start_(start) {}
     Result<void> add_bodies(const SimulateSettings& settings);
+    std::vector<SceneMesh> meshes_now() const;
+    std::vector<SceneBody> bodies_now() const;
+    std::vector<SceneCharacter> characters_now() const;
     Result<Edit> edit_of_mesh(const SceneBody& body) const;
     Result<void> check_closed(const SceneBody& body, const Edit& edit) const;
     Result<void> add_triggers();
@@ -134,6 +142,7 @@ private:
     Result<Recut> recut(size_t member, const Edit& edit);
     Result<void> reshape(Recut cut);
     std::vector<std::string> edits_of(const Member& m) const;
+    bool is_body(std::string_view id) const;
     Result<void> change_own(const std::string& name, const Edit& edit);
     Result<void> hide(const Member& m);
     Result<void> show(Member& m);
@@ -188,6 +197,15 @@ private:
     };
     std::vector<Part> loose_;  // those that have not settled
     int parts_ = 0, launched_ = 0;
+
+    // Who plays, while they walk in it.
+    struct Visitor {
+        physics::Character character;
+        vec3 walk{};     // m/s
+        float jump = 0;  // with the next step
+        vec3 before{};   // of its centre, the last step
+    };
+    std::optional<Visitor> visitor_;
 
     // Commands.
     std::vector<TimedCommand> commands_;

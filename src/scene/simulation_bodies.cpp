@@ -46,6 +46,11 @@ Result<Simulation::Aimed> Simulation::aim(const std::string& text, const std::st
     if (!doc || !doc->is(0, JsonType::Object)) return out;  // whoever reads it says what is wrong
     const auto inner = doc->find(0, "command");             // of a line of timed ones
     const JsonIndex command = inner ? *inner : 0;
+    for (const std::string_view section : {"meshes", "bodies", "characters"})
+        if (doc->is(command, JsonType::Object))
+            if (const auto of_start = doc->find(command, section))
+                return doc->error(*of_start,
+                                  "bodies run as the scene has them at the start; change this before they do");
     const auto at = doc->is(command, JsonType::Object) ? doc->find(command, kTarget) : std::nullopt;
     if (!at) return out;
     if (!doc->find(command, "add")) return doc->error(*at, "only edits that are added have a target");
@@ -187,6 +192,11 @@ std::vector<std::string> Simulation::edits_of(const Member& m) const {
     for (const SceneBody& b : live_->impl_->data.bodies)
         if (b.id == m.id) return b.edits;
     return {};
+}
+
+bool Simulation::is_body(std::string_view id) const {
+    return std::any_of(members_.begin(), members_.end(), [&](const Member& m) { return m.id == id; }) ||
+           std::any_of(walkers_.begin(), walkers_.end(), [&](const Walker& w) { return w.id == id; });
 }
 
 Result<void> Simulation::change_own(const std::string& name, const Edit& edit) {

@@ -6,6 +6,8 @@
 #include <kiln/shapes.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace kiln::scene {
 
@@ -19,7 +21,8 @@ Result<void> Simulation::add_characters() {
                                               .half_height = 0.5f * n.height - n.radius,
                                               .step_height = n.step_height,
                                               .steepest_deg = n.steepest_deg,
-                                              .gravity = data.physics.gravity},
+                                              .gravity = data.physics.gravity,
+                                              .fall = n.linear_velocity.y},
                                              center);
         if (!made) return fault(c.place, c.id, made.error().message);
         names_.emplace(made->body(), c.id);
@@ -59,6 +62,42 @@ void Simulation::walk() {
         }
         w.character.move(w.walk, jump, seconds_);
     }
+    if (!visitor_) return;
+    visitor_->before = visitor_->character.position();
+    visitor_->character.move(visitor_->walk, std::exchange(visitor_->jump, 0.0f), seconds_);
+}
+
+Result<void> Simulation::enter(vec3 feet) {
+    leave();
+    const physics::CharacterSettings settings{.gravity = start_.impl_->data.physics.gravity};
+    const vec3 center = feet + vec3{0, settings.half_height + settings.radius, 0};
+    auto made = physics::Character::make(*world_, settings, center);
+    if (!made) return made.error();
+    std::string name = "player";
+    while (is_body(name)) name += '\'';
+    names_.emplace(made->body(), name);
+    visitor_.emplace(Visitor{.character = std::move(*made), .before = center});
+    return {};
+}
+
+void Simulation::wish(vec3 velocity, float jump) {
+    if (!visitor_) return;
+    const auto number = [](float v) { return std::isfinite(v) ? v : 0; };
+    visitor_->walk = {number(velocity.x), 0, number(velocity.z)};
+    visitor_->jump = std::max(visitor_->jump, number(jump));
+}
+
+void Simulation::leave() {
+    if (visitor_) visitor_->character.leave();
+    visitor_.reset();
+}
+
+std::optional<PlayWalker> Simulation::visitor(float between) const {
+    if (!visitor_) return std::nullopt;
+    const physics::CharacterSettings settings;
+    const physics::Character& c = visitor_->character;
+    const vec3 center = visitor_->before * (1 - between) + c.position() * between;
+    return PlayWalker{center - vec3{0, settings.half_height + settings.radius, 0}, c.on_floor()};
 }
 
 }  // namespace kiln::scene

@@ -3,10 +3,12 @@
 // the live world of its own, which settles where it comes to rest.
 
 #include "scene/body_shapes.h"
+#include "scene/format.h"
 #include "scene/simulation.h"
 
 #include "base/format.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -24,7 +26,7 @@ Result<void> Simulation::launch(Edit edit, vec3 velocity) {
     if (edit.op != Op::Union) return Error{"launch: a body is a union edit", ErrorKind::Usage};
     if (const auto world = live(); !world) return world.error();
     do edit.name = formatted("thrown{}", ++launched_);
-    while (live_->find_edit(edit.name));
+    while (live_->find_edit(edit.name) || is_body(edit.name));
     edit.dynamic = true;
     const auto take_back = [&](const Error& error) {
         owned_.erase(edit.name);
@@ -75,6 +77,36 @@ Result<RayHit> Simulation::cast(const Ray& ray) {
     const auto world = live();
     if (!world) return world.error();
     return (*world)->cast(ray);
+}
+
+// Bodies of meshes are in the engine alone, where the last step has them.
+Result<PlayHit> Simulation::pick(const Ray& ray) {
+    auto hit = cast(ray);
+    if (!hit) return hit.error();
+    PlayHit out{*hit};
+    const auto own = [&](const Member& m) {
+        const auto names = edits_of(m);
+        const Edit* const edit = live_->find(out.hit.edit);
+        return edit != nullptr && std::find(names.begin(), names.end(), edit->name) != names.end();
+    };
+    if (out.hit.hit)
+        for (const Member& m : members_)
+            if (!m.rest && !m.gone && own(m)) out.body = m.id;
+    const float far = out.hit.hit ? out.hit.t : std::min(ray.t_max, kFarthest);
+    const auto met =
+        world_->cast_ray(ray.origin, ray.direction * far, visitor_ ? visitor_->character.body() : physics::BodyId{});
+    if (!met) return out;
+    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
+    for (size_t i = 0; i < bodies.size(); ++i) {
+        if (bodies[i].mesh.empty() || members_[i].gone || members_[i].body != met->body) continue;
+        out.body = members_[i].id;
+        out.hit.hit = true;
+        out.hit.t = met->fraction * far;
+        out.hit.position = met->position;
+        out.hit.normal = met->normal;
+        out.hit.edit = {};
+    }
+    return out;
 }
 
 PlayCounts Simulation::counts() const {

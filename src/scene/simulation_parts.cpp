@@ -86,7 +86,7 @@ Result<bool> Simulation::cut_loose(const field::LoosePart& part, const Source& f
     if (!region_fits(part.region.size)) return false;  // too wide for a region: it stays
     std::string name;
     do name = formatted("part{}", ++parts_);
-    while (live_->find_edit(name) || live_->impl_->data.object_numbers.contains(name));
+    while (live_->find_edit(name) || live_->impl_->data.object_numbers.contains(name) || is_body(name));
     const vec3 origin = part.box.center();
     const Object object = object_of_part(name, from.edits, part.region, origin);
     if (auto done = change({.kind = CommandKind::Object, .id = name, .object = &object}); !done) return done.error();
@@ -152,15 +152,23 @@ Result<void> Simulation::settle_parts() {
         const physics::BodyState state = world_->state(m.body);
         part.asleep = state.asleep ? part.asleep + 1 : 0;
         if (part.asleep < enough) continue;
+        if (auto there = live(); !there) return there.error();
+        // Of several edits: one object, whose edits act on nothing but each other.
+        if (edits_of(m).size() > 1)
+            if (auto done = show(m); !done) return done;
         m.rest = state;
         const std::string name = std::exchange(m.edit, {});
-        owned_.erase(name);
-        for (SceneBody& b : live_->impl_->data.bodies)
-            if (b.id == name) b.edits.clear();
+        for (SceneBody& b : live_->impl_->data.bodies) {
+            if (b.id != m.id) continue;
+            for (const std::string& own : b.edits) owned_.erase(own);
+            b.edits.clear();
+        }
         Edit edit = part.placed;
         edit.node.transform.position = state.pose.position;
         edit.node.transform.rotation = state.pose.rotation;
         edit.dynamic = false;
+        edit.op = Op::Union;
+        edit.blend_radius = 0;
         if (auto done = change({.kind = CommandKind::Change, .id = name, .edit = &edit}); !done) return done;
         if (auto done = change({.kind = CommandKind::Reorder, .id = name}); !done) return done;
         for (int corner = 0; corner < 8; ++corner) {
@@ -175,44 +183,6 @@ Result<void> Simulation::settle_parts() {
     std::erase_if(loose_, [&](const Part& part) { return members_[part.member].rest.has_value(); });
     edits_ = ground_of(*live_->impl_, owned_);
     return set_ground(changed);
-}
-
-// A body's edits move with its first.
-Result<void> Simulation::keep_poses(World& world) const {
-    const auto put = [&](const Member& m, const std::string& name) -> Result<void> {
-        const auto id = world.find_edit(name);
-        if (!id) return Error{formatted("keep: there is no edit \"{}\"", name), ErrorKind::Usage};
-        const physics::Pose pose = state(m).pose;
-        if (pose == m.began) return {};
-        Edit edit = *world.find(*id);
-        const physics::Pose frame = frame_of(edit);
-        const physics::Pose now = frame == m.began ? pose : pose * inverse(m.began) * frame;
-        edit.node.transform.position = now.position;
-        edit.node.transform.rotation = now.rotation;
-        return world.change(*id, edit);
-    };
-    const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
-    for (size_t i = 0; i < bodies.size(); ++i)
-        for (const std::string& name : bodies[i].edits)
-            if (auto done = members_[i].gone ? Result<void>() : put(members_[i], name); !done) return done;
-    for (const Part& part : loose_)
-        if (auto done = put(members_[part.member], members_[part.member].edit); !done) return done;
-    return {};
-}
-
-Result<void> Simulation::keep(World& world) const {
-    History history = world.history();
-    history.begin_group("play");
-    const auto all = [&]() -> Result<void> {
-        for (const std::string& command : made_)
-            if (auto applied = world.apply(command, "keep"); !applied) return applied;
-        return keep_poses(world);
-    };
-    if (auto done = all(); !done) {
-        (void)history.cancel_group();
-        return done;
-    }
-    return history.end_group();
 }
 
 }  // namespace kiln::scene

@@ -16,6 +16,7 @@ namespace kiln {
 using scene::Change;
 using scene::CommandKind;
 using scene::EditList;
+using scene::SceneData;
 using What = Change::What;
 
 namespace {
@@ -103,14 +104,28 @@ Result<void> World::Impl::exchange_material(Change& change) {
         std::swap(data.materials[number].second, held->second);
         // What light now goes through, or no longer does, stands apart, or no longer does.
         const bool through = data.materials[number].second.opacity < 1;
-        if (!compile_later && through != (held->second.opacity < 1)) {
-            find_movers();
-            const std::lock_guard lock(mutex);
-            program.reset();
-            all.reset();
-            asked.reset();
-        }
+        if (!compile_later && through != (held->second.opacity < 1)) apart_anew();
     }
+    return {};
+}
+
+void World::Impl::apart_anew() {
+    find_movers();
+    const std::lock_guard lock(mutex);
+    program.reset();
+    all.reset();
+    asked.reset();
+}
+
+// Files are read again only where they, or what they are painted with, may be others.
+Result<void> World::Impl::exchange_meshes(Change& change) {
+    std::vector<scene::SceneMesh>& held = *change.get<std::vector<scene::SceneMesh>>();
+    std::swap(data.meshes, held);
+    if (compile_later) return {};
+    const bool same =
+        std::equal(held.begin(), held.end(), data.meshes.begin(), data.meshes.end(),
+                   [](const auto& a, const auto& b) { return a.file == b.file && a.material == b.material; });
+    if (!same) meshes = scene::load_meshes(data);
     return {};
 }
 
@@ -146,11 +161,21 @@ Result<void> World::Impl::exchange(World& world, Change& change) {
         recorded = now;
         return Result<void>();
     };
+    SceneData& d = data;
     switch (change.what) {
     case What::Presence:
     case What::Content:
     case What::Order:
         return exchange_edit(change);
+    case What::Meshes:
+        return exchange_meshes(change);
+    case What::Bodies:
+        std::swap(d.bodies, *change.get<std::vector<scene::SceneBody>>());
+        if (!compile_later) apart_anew();
+        return {};
+    case What::Characters:
+        std::swap(d.characters, *change.get<std::vector<scene::SceneCharacter>>());
+        return {};
     case What::Material:
         return exchange_material(change);
     case What::Object:
@@ -209,6 +234,15 @@ std::string World::Impl::command_of(const World& world, const Change& change) co
         } else {
             view = {.kind = CommandKind::Object, .id = change.get<Object>()->name};
         }
+        break;
+    case What::Meshes:
+        view.kind = CommandKind::Meshes;
+        break;
+    case What::Bodies:
+        view.kind = CommandKind::Bodies;
+        break;
+    case What::Characters:
+        view.kind = CommandKind::Characters;
         break;
     case What::Field:
         view.kind = CommandKind::Field;
@@ -358,10 +392,24 @@ void World::Impl::keep_log(const World& world) {
 }
 
 scene::CommandNames World::Impl::names() const {
-    return {data.material_numbers, data.object_numbers, [this](std::string_view name) -> const Edit* {
+    return {data.material_numbers, data.object_numbers,
+            [this](std::string_view name) -> const Edit* {
                 const uint32_t slot = edits.find(name);
                 return slot == EditList::kNone ? nullptr : edits[slot].edit.get();
-            }};
+            },
+            &data};
+}
+
+// What was there stands where it stood in the file.
+template <typename T>
+Result<void> World::Impl::make_section(World& world, What what, std::vector<T> items, const std::vector<T>& had) {
+    std::unordered_map<std::string_view, scene::JsonIndex> places;
+    for (const T& item : had) places.emplace(item.id, item.place);
+    for (T& item : items) {
+        const auto was = places.find(item.id);
+        item.place = was == places.end() ? SceneData::kNowhere : was->second;
+    }
+    return make(world, Change{.what = what, .held = std::make_unique<std::vector<T>>(std::move(items))});
 }
 
 // Names have been looked up by the reader.
@@ -417,6 +465,12 @@ Result<void> World::Impl::apply(World& world, scene::Command command) {
     case CommandKind::Cameras:
         world.cameras = std::move(command.stage.cameras);
         break;
+    case CommandKind::Meshes:
+        return make_section(world, What::Meshes, std::move(command.meshes), data.meshes);
+    case CommandKind::Bodies:
+        return make_section(world, What::Bodies, std::move(command.bodies), data.bodies);
+    case CommandKind::Characters:
+        return make_section(world, What::Characters, std::move(command.characters), data.characters);
     }
     return record_stage(world);
 }

@@ -71,12 +71,15 @@ void discard_unfinished_files() noexcept { AtomicFile::remove_temporaries_from_s
 Result<World> World::load(const std::string& path_or_name, int workers, bool past) {
     struct stat info {};
     const bool is_name = path_or_name.find('/') == std::string::npos && path_or_name.find('.') == std::string::npos;
+    if (is_bundled_scene(path_or_name)) {
+        const auto files = scene::bundled_files();
+        const auto found =
+            std::find_if(files.begin(), files.end(), [&](const auto& file) { return file.name == path_or_name; });
+        return parse(found->json, path_or_name);
+    }
     if (is_name && ::stat(path_or_name.c_str(), &info) != 0) {
         std::vector<std::string_view> names;
-        for (const scene::BundledScene& file : scene::bundled_files()) {
-            if (file.name == path_or_name) return parse(file.json, path_or_name);
-            names.push_back(file.name);
-        }
+        for (const scene::BundledScene& file : scene::bundled_files()) names.push_back(file.name);
         return Error{formatted("{}: neither a file nor a bundled scene; {}", path_or_name,
                                scene::suggestion(path_or_name, names)),
                      ErrorKind::Input};
@@ -396,6 +399,13 @@ bool World::Impl::stand_on(std::string text, const std::string& scene) {
     log->lose_places();
     data.source = std::move(again->source);
     data.object_places = std::move(again->object_places);
+    const auto stand = [](auto& items, const auto& read) {
+        for (size_t k = 0; k < std::min(items.size(), read.size()); ++k) items[k].place = read[k].place;
+    };
+    stand(data.meshes, again->meshes);
+    stand(data.bodies, again->bodies);
+    stand(data.triggers, again->triggers);
+    stand(data.characters, again->characters);
     size_t i = 0;
     std::vector<uint32_t> slots;
     edits.each([&](uint32_t slot) { slots.push_back(slot); });
@@ -408,7 +418,7 @@ namespace {
 // Models that a bundled scene has in the program, beside the file that it becomes.
 Result<void> bring_models(const scene::SceneData& data, const std::string& folder) {
     for (const auto& mesh : data.meshes) {
-        const auto bytes = scene::bundled_model(data.source.name(), mesh.file);
+        const auto bytes = scene::bundled_model(data, mesh.file);
         if (bytes.empty()) continue;
         const std::string_view model{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
         const std::string path = folder + mesh.file;
@@ -433,7 +443,7 @@ Result<void> World::save(const std::string& path) const {
     if (RecordFile::is_held(journal))
         return Error{journal + ": held by a program that edits this scene; close it there first", ErrorKind::Failed};
     const std::string folder = path.substr(0, path.find_last_of('/') + 1);
-    const bool bundled = impl_->data.folder.empty() && scene::is_bundled(impl_->data.source.name());
+    const bool bundled = scene::is_bundled(impl_->data);
     if (bundled)
         if (auto done = bring_models(impl_->data, folder); !done) return done;
     auto file = AtomicFile::create(path);

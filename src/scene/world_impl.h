@@ -60,6 +60,11 @@ struct World::Impl {
     Result<void> exchange_edit(scene::Change& change);
     Result<void> exchange_material(scene::Change& change);
     Result<void> exchange_object(scene::Change& change);
+    Result<void> exchange_meshes(scene::Change& change);
+    /// Finds again what stands apart, after which there is another program.
+    void apart_anew();
+    template <typename T>
+    Result<void> make_section(World& world, scene::Change::What what, std::vector<T> items, const std::vector<T>& had);
     /// As exchange(), of changes that were good a moment ago.
     void take_back(World& world, scene::Change& change);
     /// The command that leads from the state that the change holds to what the world has now.

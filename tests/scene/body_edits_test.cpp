@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "simulated.h"
+#include "played.h"
 
 #include <cmath>
 #include <string>
@@ -17,6 +17,7 @@ using namespace kiln;
 using nlohmann::json;
 using scene::engines;
 using scene::parsed;
+using scene::Played;
 using testing::HasSubstr;
 
 namespace {
@@ -35,33 +36,6 @@ constexpr const char* kInTheAir = R"({"format": 1, "field": {"voxel_size": 0.05}
   "bodies": [{"id": "bar", "edits": ["bar"], "linear_velocity": [0, 1, 0], "angular_velocity": [0, 0, 2]},
              {"id": "ball", "edits": ["ball"], "linear_velocity": [0, 0.5, 0], "angular_velocity": [0, 0, 1]},
              {"id": "two", "edits": ["low", "high"]}]})";
-
-struct Played {
-    World start;
-    Play play;
-    Played(const std::string& engine, const char* text) : start(parsed(text)), play(made(start, engine)) {}
-    static Play made(const World& world, const std::string& engine) {
-        auto out = Play::start(world, {.backend = engine});
-        EXPECT_TRUE(out) << (out ? "" : out.error().message);
-        return std::move(*out);
-    }
-    void run(int steps) {
-        for (int i = 0; i < steps; ++i) {
-            const auto done = play.step();
-            ASSERT_TRUE(done) << done.error().message;
-        }
-    }
-    void apply(const std::string& command) {
-        const auto done = play.apply(command);
-        ASSERT_TRUE(done) << done.error().message;
-    }
-    World kept(const char* text) const {
-        World out = parsed(text);
-        const auto done = play.keep(out);
-        EXPECT_TRUE(done) << (done ? "" : done.error().message);
-        return out;
-    }
-};
 
 std::string line(double time, const std::string& command) {
     return "{\"time\": " + std::to_string(time) + ", \"command\": " + command + "}";
@@ -122,7 +96,7 @@ TEST(BodyEdits, AllIsTheWorldAndWhatItOverlapsAndPicturesAndWhoKeepsItSeeIt) {
         auto frame = p.play.frame(kCamera);
         ASSERT_TRUE(frame) << frame.error().message;
         EXPECT_EQ(frame->instances.size(), 3u);
-        const World kept = p.kept(kInTheAir);
+        const World kept = p.kept();
         EXPECT_GT(kept.distance({-5, 3, 0}), 0.1f) << engine << ": the body";
         EXPECT_LT(kept.distance({-5.3f, 3, 0}), 0);
         EXPECT_GT(kept.distance({-5, 3.5f, 0}), 0.1f) << engine << ": its second edit";
@@ -166,7 +140,7 @@ TEST(BodyEdits, ABodyThatIsDugAwayWholeIsNoMore) {
         auto frame = p.play.frame(kCamera);
         ASSERT_TRUE(frame);
         EXPECT_EQ(frame->instances.size(), 2u) << engine;
-        EXPECT_GT(p.kept(kInTheAir).distance({5, 3, 0}), 0);
+        EXPECT_GT(p.kept().distance({5, 3, 0}), 0);
     }
 }
 
@@ -186,7 +160,7 @@ TEST(BodyEdits, TargetsThatCannotBeHitSayWhy) {
     ASSERT_FALSE(outside);
     EXPECT_THAT(outside.error().message, HasSubstr("while bodies run"));
     p.run(1);
-    EXPECT_EQ(p.kept(kInTheAir).edits().size(), world.edits().size()) << "refused, they changed nothing";
+    EXPECT_EQ(p.kept().edits().size(), world.edits().size()) << "refused, they changed nothing";
 }
 
 TEST(BodyEdits, WhatIsTooSmallToBeABodyIsCountedAndSeenToFall) {
@@ -208,7 +182,7 @@ TEST(BodyEdits, WhatIsTooSmallToBeABodyIsCountedAndSeenToFall) {
         ASSERT_EQ(frame->particles.size(), 1u) << engine;
         const float height = frame->particles[0].position.y;
         EXPECT_NEAR(height, 0.85f, 0.1f);
-        EXPECT_GT(p.kept(kTooth).distance({0, 0.85f, 0}), 0) << engine << ": it hangs no more";
+        EXPECT_GT(p.kept().distance({0, 0.85f, 0}), 0) << engine << ": it hangs no more";
         p.run(10);
         frame = p.play.frame(kCamera);
         ASSERT_EQ(frame->particles.size(), 1u);

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "simulated.h"
+#include "played.h"
 #include "temp_folder.h"
 
 #include <cmath>
@@ -16,6 +16,7 @@
 using namespace kiln;
 using scene::engines;
 using scene::parsed;
+using scene::Played;
 using testing::HasSubstr;
 
 namespace {
@@ -35,44 +36,12 @@ constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
 constexpr const char* kSlit =
     R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
 
-struct Played {
-    World start = parsed(kPillar);
-    Play play;
-    explicit Played(const std::string& engine) : play(started(start, engine)) {}
-    static Play started(const World& world, const std::string& engine) {
-        auto out = Play::start(world, {.backend = engine});
-        EXPECT_TRUE(out) << (out ? "" : out.error().message);
-        return std::move(*out);
-    }
-    void run(int steps) {
-        for (int i = 0; i < steps; ++i) {
-            const auto done = play.step();
-            ASSERT_TRUE(done) << done.error().message;
-        }
-    }
-    void apply(const char* command) {
-        const auto done = play.apply(command);
-        ASSERT_TRUE(done) << done.error().message;
-    }
-    World kept() const {
-        World out = parsed(kPillar);
-        const auto done = play.keep(out);
-        EXPECT_TRUE(done) << (done ? "" : done.error().message);
-        return out;
-    }
-    Frame shown() {
-        auto frame = play.frame(kCamera);
-        EXPECT_TRUE(frame) << (frame ? "" : frame.error().message);
-        return std::move(*frame);
-    }
-};
-
 std::string_view material_at(const World& world, vec3 p) { return world.material_name(world.sample(p).material); }
 
 TEST(Parts, ArePartOfTheSolidInTheirOwnColoursAndMoveInPictures) {
     for (const std::string& engine : engines()) {
-        Played p(engine);
-        EXPECT_EQ(p.shown().instances.size(), 1u);
+        Played p(engine, kPillar);
+        EXPECT_EQ(p.shown(kCamera).instances.size(), 1u);
         p.apply(kSlit);
         p.run(1);
         // As it hangs there, a step fallen, world and part are what the dig left, each point once.
@@ -92,18 +61,18 @@ TEST(Parts, ArePartOfTheSolidInTheirOwnColoursAndMoveInPictures) {
         EXPECT_GT(solid, 300);
         EXPECT_EQ(material_at(kept, {0.31f, 2.8f, 0}), "red") << engine;
         EXPECT_EQ(material_at(kept, {0.31f, 2.4f, 0}), "stone") << engine;
-        const Frame frame = p.shown();
+        const Frame frame = p.shown(kCamera);
         ASSERT_EQ(frame.instances.size(), 2u) << engine << ": it stands apart";
         const float height = frame.instances[1].pose.position.y;
         p.run(20);
-        const Frame later = p.shown();
+        const Frame later = p.shown(kCamera);
         EXPECT_LT(later.instances[1].pose.position.y, height - 0.2f) << engine;
         EXPECT_EQ(later.instances[1].before, frame.instances[1].pose) << engine << ": motion";
         const World flying = p.kept();
         EXPECT_EQ(flying.find(*flying.find_edit("part1"))->node.transform.position, later.instances[1].pose.position)
             << engine << ": kept in flight";
         p.run(400);
-        EXPECT_EQ(p.shown().instances.size(), 1u) << engine << ": it is ground again";
+        EXPECT_EQ(p.shown(kCamera).instances.size(), 1u) << engine << ": it is ground again";
         const World settled = p.kept();
         EXPECT_LT(settled.distance({0, 1.8f, 0}), 0) << engine << ": it stands on the stump";
         EXPECT_GT(settled.distance({0, 3.7f, 0}), 0);
@@ -113,7 +82,7 @@ TEST(Parts, ArePartOfTheSolidInTheirOwnColoursAndMoveInPictures) {
 
 TEST(Parts, ThatHaveSettledAreChangedByLaterEditsAsTheWorldIs) {
     for (const std::string& engine : engines()) {
-        Played p(engine);
+        Played p(engine, kPillar);
         p.apply(kSlit);
         p.run(2);
         // A hole in the air, where the part comes to rest later: it is no hole of the part.
@@ -196,14 +165,14 @@ TEST(Parts, SurviveARestartInTheJournalAndAreTakenBackInOneStep) {
 
 TEST(Parts, ThatAreLooseAreNoEditsOfTheWorldForCommands) {
     for (const std::string& engine : engines()) {
-        Played p(engine);
+        Played p(engine, kPillar);
         p.apply(kSlit);
         p.run(5);
         const auto refused = p.play.apply(R"({"remove": "part1"})", "editor");
         ASSERT_FALSE(refused);
         EXPECT_THAT(refused.error().message, HasSubstr("editor: \"part1\" is a body's"));
         p.run(1);
-        EXPECT_EQ(p.shown().instances.size(), 2u) << engine;
+        EXPECT_EQ(p.shown(kCamera).instances.size(), 2u) << engine;
         // Kept by a world that is not the one that was played: refused whole.
         World other = parsed(R"({"format": 1, "edits": [{"id": "slit", "shape": "sphere"}]})");
         const std::string before = other.to_json();
