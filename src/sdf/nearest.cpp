@@ -11,8 +11,10 @@
 namespace kiln::sdf {
 namespace {
 
-constexpr double kHalfDiagonal = 1.7320509;
-constexpr int kMostCubes = 1600000;  // about a second; only surfaces that are everywhere equally near need so many
+constexpr int kMostParts = 1600000;  // about a second; only surfaces that are everywhere equally near need so many
+constexpr int kPatience =
+    3;  // halvings, which may bring a box into a smaller region; as many until code may have become shorter
+constexpr int kMostIdle = 3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 dvec3 operator+(dvec3 a, dvec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -22,20 +24,16 @@ double dot(dvec3 a, dvec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 double length(dvec3 a) { return std::sqrt(dot(a, a)); }
 double largest(dvec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
-double distance_to_cube(dvec3 p, dvec3 center, double half) {
-    const auto axis = [half](double d) { return std::max(std::abs(d) - half, 0.0); };
-    const dvec3 d = p - center;
-    return length({axis(d.x), axis(d.y), axis(d.z)});
-}
-
-// A cube that may hold the nearest point, and its code: a region's, or a piece of the search's own.
-struct Cube {
-    dvec3 center;
-    double half;
+// A box that may hold the nearest point, and its code: a region's, or a piece of the search's own.
+struct Part {
+    dvec3 center, half;
     double least;  // no surface point in it is nearer
+    double zeros;  // no zero of its code's operands is
     const Regions::Node* node;
     size_t first, count;
-    bool operator<(const Cube& other) const { return least > other.least; }  // the nearest on top
+    int idle;                                                                // times that its code was pruned to no use
+    int until;                                                               // halvings until it is pruned again
+    bool operator<(const Part& other) const { return least > other.least; }  // the nearest on top
 };
 
 class Search {
@@ -136,73 +134,132 @@ private:
         if (hit_) slide();
     }
 
-    TapeView tape_of(const Cube& cube) const {
-        const std::span<const Instruction> code = cube.node != nullptr
-                                                      ? std::span<const Instruction>(cube.node->code)
-                                                      : std::span(own_).subspan(cube.first, cube.count);
+    TapeView tape_of(const Part& part) const {
+        const std::span<const Instruction> code = part.node != nullptr
+                                                      ? std::span<const Instruction>(part.node->code)
+                                                      : std::span(own_).subspan(part.first, part.count);
         return view(regions_.program(), code);
     }
 
-    void push(Cube cube) {
-        cube.least = std::max(cube.least, distance_to_cube(p_, cube.center, cube.half));
-        if (cube.least >= worth()) return;
-        cube.least = std::max(cube.least, zero_bound(tape_of(cube), p_));
-        if (cube.least < worth()) queue_.push(cube);
+    // Draws the box in around what of it lies in the ball that a better answer must come from. False when nothing does. Most boxes
+    // that are left late lie across that ball's border, and only a corner of them has to be shown free.
+    bool draw_in(Part& part) const {
+        const double within = worth(), room = 1e-12 * (1 + largest(p_) + within);
+        const dvec3 d = p_ - part.center;
+        const auto gap = [](double off, double half) { return std::max(std::abs(off) - half, 0.0); };
+        const dvec3 gaps{gap(d.x, part.half.x), gap(d.y, part.half.y), gap(d.z, part.half.z)};
+        const double far = dot(gaps, gaps);
+        if (far >= within * within) return false;
+        part.least = std::max(part.least, std::sqrt(far));
+        if (!std::isfinite(within)) return true;
+        const auto draw = [&](double p, double own_gap, double& center, double& half) {
+            const double reach = std::sqrt(within * within - (far - own_gap * own_gap)) + room;
+            const double low = std::max(center - half, p - reach), high = std::min(center + half, p + reach);
+            if (high - low >= 2 * half) return;
+            center = 0.5 * (low + high);
+            half = std::max(0.5 * (high - low), 0.0) + room;
+        };
+        draw(p_.x, gaps.x, part.center.x, part.half.x);
+        draw(p_.y, gaps.y, part.center.y, part.half.y);
+        draw(p_.z, gaps.z, part.center.z, part.half.z);
+        return true;
     }
 
-    void push_child(const Cube& parent, int octant) {
-        Cube cube = parent;
-        cube.half = 0.5 * parent.half;
-        const auto middle = [&](double c, int bit) { return c + ((octant >> bit & 1) != 0 ? cube.half : -cube.half); };
-        cube.center = {middle(parent.center.x, 0), middle(parent.center.y, 1), middle(parent.center.z, 2)};
-        if (distance_to_cube(p_, cube.center, cube.half) >= worth()) return;
-        cube.node = parent.node != nullptr ? regions_.child(*parent.node, octant) : nullptr;
-        if (cube.node == nullptr) {
-            const double radius = (kHalfDiagonal * cube.half + 1e-6 * largest(cube.center)) * 1.0001;
-            prune(tape_of(parent), {float(cube.center.x), float(cube.center.y), float(cube.center.z)}, float(radius),
-                  kept_, scratch_);
-            cube.first = own_.size();
-            cube.count = kept_.size();
-            own_.insert(own_.end(), kept_.begin(), kept_.end());
+    static bool holds(const Regions::Node& node, const Part& part) {
+        const dvec3 d = part.center - node.center;
+        return std::abs(d.x) + part.half.x <= node.half && std::abs(d.y) + part.half.y <= node.half &&
+               std::abs(d.z) + part.half.z <= node.half;
+    }
+
+    // The least code at hand that is right in the box.
+    void find_code(Part& part) {
+        bool whole = false;  // the region is as small as regions get
+        while (part.node != nullptr && !whole) {
+            const dvec3 c = part.node->center;
+            const int octant =
+                (part.center.x > c.x ? 1 : 0) | (part.center.y > c.y ? 2 : 0) | (part.center.z > c.z ? 4 : 0);
+            const Regions::Node* child = regions_.child(*part.node, octant);
+            whole = child == nullptr;
+            if (whole || !holds(*child, part)) break;
+            part.node = child;
+            part.zeros = -1;
+            part.idle = 0;
+            part.until = kPatience;
         }
-        push(cube);
+        if (part.until > 0 && !(whole && part.idle == 0)) {
+            --part.until;
+            return;
+        }
+        const double radius = (length(part.half) + 1e-6 * largest(part.center)) * 1.0001;
+        const TapeView tape = tape_of(part);
+        const size_t before = tape.code.size();
+        prune(tape, {float(part.center.x), float(part.center.y), float(part.center.z)}, float(radius), kept_, scratch_);
+        part.idle = kept_.size() < before ? 0 : std::min(part.idle + 1, kMostIdle);
+        part.until = kPatience * part.idle;
+        if (part.idle > 0) return;
+        part.node = nullptr;
+        part.first = own_.size();
+        part.count = kept_.size();
+        own_.insert(own_.end(), kept_.begin(), kept_.end());
+        part.zeros = -1;
     }
 
-    // The cube around everything that can matter.
+    void push(Part part) {
+        if (!draw_in(part)) return;
+        find_code(part);
+        if (part.zeros < 0) part.zeros = zero_bound(tape_of(part), p_);
+        part.least = std::max(part.least, part.zeros);
+        if (part.least >= worth()) return;
+        const double value = side_ * evaluate(tape_of(part), part.center);
+        if (value > length(part.half) + 1e-12 * (1 + largest(part.center))) return;
+        if (value <= 0 && try_towards(part.center - p_)) slide();
+        queue_.push(part);
+    }
+
+    // Both halves, across the longest side.
+    void push_halves(const Part& part) {
+        for (const double side : {-0.5, 0.5}) {
+            Part half = part;
+            const dvec3 h = part.half;
+            const bool x = h.x >= h.y && h.x >= h.z, y = !x && h.y >= h.z;
+            double& length = x ? half.half.x : y ? half.half.y : half.half.z;
+            (x ? half.center.x : y ? half.center.y : half.center.z) += side * length;
+            length *= 0.5;
+            push(half);
+        }
+    }
+
+    // The box around everything that can matter.
     void push_start() {
         const Regions::Node& root = regions_.root();
         const double around = largest(p_ - root.center);
+        const auto cube = [&](dvec3 center, double half, const Regions::Node* node) {
+            push({center, {half, half, half}, least_, -1, node, 0, own_.size(), 0, kPatience});
+        };
         if (around + found_ <= root.half || (around < root.half && !std::isfinite(found_))) {
-            push({root.center, root.half, least_, &root, 0, 0});
+            cube(root.center, root.half, &root);
             return;
         }
         const std::span<const Instruction> tape = regions_.program().tape();
         own_.assign(tape.begin(), tape.end());
-        const double half = std::isfinite(found_) ? found_ : 2 * (around + root.half);
-        push({p_, half, least_, nullptr, 0, own_.size()});
+        cube(p_, std::isfinite(found_) ? found_ : 2 * (around + root.half), nullptr);
     }
 
     void branch_and_bound() {
         push_start();
-        double undecided = kInfinity;  // least of the cubes that are too small to halve
-        int cubes = 0;
+        double undecided = kInfinity;  // least of the boxes that are too small to halve
+        int parts = 0;
         while (!queue_.empty()) {
-            const Cube cube = queue_.top();
-            least_ = std::max(least_, std::min({cube.least, undecided, found_}));
-            if (near_enough() || cube.least >= worth()) break;
-            if (++cubes > kMostCubes) return;
+            const Part part = queue_.top();
+            least_ = std::max(least_, std::min({part.least, undecided, found_}));
+            if (near_enough() || part.least >= worth()) break;
+            if (++parts > kMostParts) return;
             queue_.pop();
-            const double value = side_ * evaluate(tape_of(cube), cube.center);
-            const double radius = kHalfDiagonal * cube.half;
-            if (value > radius + 1e-12 * (1 + largest(cube.center))) continue;
-            if (value <= 0) {
-                if (try_towards(cube.center - p_)) slide();
-            }
-            if (cube.half < 1e-3 * tolerance_) {
-                undecided = std::min(undecided, cube.least);
+            if (largest(part.half) < 1e-3 * tolerance_) {
+                undecided = std::min(undecided, part.least);
                 continue;
             }
-            for (int octant = 0; octant < 8; ++octant) push_child(cube, octant);
+            push_halves(part);
         }
         least_ = std::max(least_, std::min(undecided, worth()));
     }
@@ -217,7 +274,7 @@ private:
     bool hit_ = false;
     dvec3 point_;
     Regions::Cursor cursor_ = nullptr;
-    std::priority_queue<Cube> queue_;
+    std::priority_queue<Part> queue_;
     std::vector<Instruction> own_, kept_;
     PruneScratch scratch_;
 };
@@ -254,7 +311,7 @@ bool solid_in_box(const Regions& regions, dvec3 center, vec3 half, quat rotation
     };
     push({}, {double(half.x), double(half.y), double(half.z)});
     for (int parts = 0; !solid && !queue.empty(); ++parts) {
-        if (parts > kMostCubes) return true;
+        if (parts > kMostParts) return true;
         const Part part = queue.top();
         queue.pop();
         dvec3 h = part.half, step{};

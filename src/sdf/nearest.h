@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MIT
 // True distances: where the nearest point of a program's surface is, on both sides. The program's own value is only a bound inside
-// unions, outside intersections and in blends. Branch and bound over cubes, nearest first: a cube in which the value at the centre
+// unions, outside intersections and in blends. Branch and bound over boxes, nearest first: a box in which the value at the centre
 // exceeds the half diagonal holds no surface; and a surface point in it is a zero of one of the operands that still matter
-// there, so it is no nearer than the least of those operands' own values (all are 1-Lipschitz). Any thread.
+// there, so it is no nearer than the least of those operands' own values (all are 1-Lipschitz). A box is drawn in to what of it lies
+// in the ball that a better answer must come from. How many boxes that takes where values are a share 1 / L of the distance grows with
+// L³ and with the size of the ball over the tolerance: around a planet of noise some hundred thousand, two tenths of a second. Any thread.
 #pragma once
 
 #include "sdf/regions.h"

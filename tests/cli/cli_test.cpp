@@ -273,7 +273,9 @@ TEST_F(Cli, QueryAnswersInOrder) {
 }
 
 TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
-    write("ball.kiln.json", kBall);
+    write("ball.kiln.json",
+          "{\"format\": 1, \"materials\": {\"clay\": {}}, \"edits\": [{\"id\": \"ball\", \"shape\": \"sphere\", "
+          "\"radius\": 1, \"material\": \"clay\"}]}");
     std::string points;
     for (int i = 0; i < 50; ++i) points += "0.001," + std::to_string(0.98 + 0.001 * i) + ",0.002\n";
     write("p.csv", points);
@@ -283,11 +285,16 @@ TEST_F(Cli, QueryOfBricksIsNearTheExactAnswer) {
     int rows = 0;
     while (std::getline(exact, a) && std::getline(bricks, b)) {
         if (a[0] == 'x') continue;
-        const auto distance = [](std::string row) {
-            for (int i = 0; i < 3; ++i) row.erase(0, row.find(',') + 1);
-            return std::stof(row);
-        };
-        EXPECT_NEAR(distance(a), distance(b), 1e-4f) << a;
+        EXPECT_TRUE(a.ends_with(",clay")) << a;
+        std::istringstream left(a), right(b);
+        std::string exactly, stored;
+        for (int column = 0; std::getline(left, exactly, ',') && std::getline(right, stored, ','); ++column) {
+            if (column < 3 || column > 6) {
+                EXPECT_EQ(exactly, stored) << a;  // the point asked, and the material's name
+            } else {
+                EXPECT_NEAR(std::stof(exactly), std::stof(stored), column == 3 ? 1e-4f : 1e-2f) << a;
+            }
+        }
         ++rows;
     }
     EXPECT_EQ(rows, 50);
@@ -617,6 +624,10 @@ TEST_F(Cli, BenchNamesItsRowsAndAnswersOneObject) {
                             "\"peer\": ", "\"peer_value\": ", "\"ratio\": ", "\"roof_ratio\": ", "\"checksum\": \""})
         EXPECT_THAT(o.out, HasSubstr(key));
     EXPECT_THAT(run("bench field/memory.per_voxel --count 20").out, HasSubstr("of roof"));
+    write("ball.kiln.json", kBall);
+    EXPECT_THAT(run("bench field/memory.per_voxel --scene ball.kiln.json").out, HasSubstr("ball.kiln.json, 1 edits\n"));
+    EXPECT_EQ(run("bench field/memory.per_voxel --scene ball.kiln.json --kind 1").code, 2);
+    EXPECT_EQ(run("bench field/edit.add --scene ball.kiln.json").code, 2);
 }
 
 TEST_F(Cli, SimulateTellsWaysAndFaults) {

@@ -4,6 +4,7 @@
 #include "measure/letters.h"
 #include "measure/recipes.h"
 #include "measure/slow.h"
+#include "measure/slow_mesh.h"
 
 #include "sdf/eval.h"
 #include "sdf/expression.h"
@@ -184,6 +185,25 @@ TEST(Bench, TheSlowWaySeesOneTexelThatDiffers) {
         EXPECT_GT(slow.band_voxels, slow.bricks);
     }
     EXPECT_NE(brute_force(*sdf::compile({moved, {}, {}}), bricks.field()).checksum, stored(bricks).checksum);
+}
+
+TEST(Bench, TheSlowMeshSeesOneCornerThatMoved) {
+    field::FieldOptions options;
+    options.voxel_size = 2.0f / 48;
+    options.bounds = {{-1, -1, -1}, {1, 1, 1}};
+    const auto program = std::make_shared<const sdf::Program>(*sdf::compile({recipe(1, 5, 60), {}, {}}));
+    const field::HostBricks host = field::HostBricks::bake(*field::Field::build(program, options));
+    const field::MeshBricks bricks(host);
+    field::Mesh smooth, sharp, slow_way;
+    field::mesh_smooth(bricks, smooth);
+    EXPECT_EQ(checksum_of_triangles(smooth), smooth_mesh_by_voxel(host));
+    smooth.positions[7].y = std::nextafter(smooth.positions[7].y, 2.0f);
+    EXPECT_NE(checksum_of_triangles(smooth), smooth_mesh_by_voxel(host));
+    field::mesh_sharp(bricks, field::exact_of(host, bricks), sharp);
+    field::mesh_sharp(bricks, every_edit(host, bricks, 1), slow_way);
+    EXPECT_EQ(checksum_of_bytes(sharp), checksum_of_bytes(slow_way));
+    std::swap(sharp.triangles[3], sharp.triangles[4]);
+    EXPECT_NE(checksum_of_bytes(sharp), checksum_of_bytes(slow_way));
 }
 
 TEST(BenchFrameGpu, EveryPassOfEverySizeIsARowAndPicturesAreTheSame) {
