@@ -93,8 +93,7 @@ struct AoGpu : testing::Test {
         double worst = 0, worst_by_edge = 0, mean = 0, bias = 0;
         int judged = 0;
     };
-    static Apart apart(const Picture& p, const Camera& camera, float height,
-                       const std::function<double(vec3)>& truth) {
+    static Apart apart(const Picture& p, const Camera& camera, float height, const std::function<double(vec3)>& truth) {
         const shade::CameraParams eye = shade::camera_params(camera, p.width, p.height);
         Apart out;
         const auto by_edge = [&](int x, int y) {
@@ -110,8 +109,8 @@ struct AoGpu : testing::Test {
             for (int x = 0; x < p.width; ++x) {
                 const size_t i = size_t(y * p.width + x);
                 if (!std::isfinite(p.depth[i])) continue;
-                const vec3 at = camera.position +
-                                shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f) * p.depth[i];
+                const vec3 at =
+                    camera.position + shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f) * p.depth[i];
                 if (std::fabs(at.y - height) > 2e-3f) continue;
                 const double should = truth(at);
                 if (should < 0) continue;
@@ -168,8 +167,11 @@ TEST_F(AoGpu, APlaneAndABallAloneAreOpen) {
     for (const AmbientOcclusion ao : {AmbientOcclusion::Full, AmbientOcclusion::Half}) {
         for (const vec3 eye : {vec3{0.3f, 1, 0.8f}, vec3{2, 0.12f, 0.1f}}) {
             for (const bool refine : {true, false}) {
-                expect_all_open(open(frame_of(plane, eye), {.width = 64, .height = 48, .refine = refine, .ao = ao}), "plane");
-                expect_all_open(open(frame_of(tilted, eye + vec3{0, 1.5f, 0}), {.width = 64, .height = 48, .refine = refine, .ao = ao}), "tilted");
+                expect_all_open(open(frame_of(plane, eye), {.width = 64, .height = 48, .refine = refine, .ao = ao}),
+                                "plane");
+                expect_all_open(open(frame_of(tilted, eye + vec3{0, 1.5f, 0}),
+                                     {.width = 64, .height = 48, .refine = refine, .ao = ao}),
+                                "tilted");
             }
         }
         Frame ball = frame_of(field::worlds::sphere_of(10));
@@ -203,8 +205,8 @@ TEST_F(AoGpu, ABallOnAPlaneHidesWhatItsFormFactorSays) {
     field::worlds::World w = plane_world();
     w.edits.push_back(edit(Sphere{.radius = r}, {0, r, 0}));
     const Frame frame = looking_down(w);
-    for (const auto& [ao, worst, mean] : {std::tuple{AmbientOcclusion::Full, 0.045, 0.006},
-                                          std::tuple{AmbientOcclusion::Half, 0.07, 0.011}}) {
+    for (const auto& [ao, worst, mean] :
+         {std::tuple{AmbientOcclusion::Full, 0.045, 0.006}, std::tuple{AmbientOcclusion::Half, 0.07, 0.011}}) {
         const Picture p = open(frame, {.width = 128, .height = 96, .ao = ao});
         const Apart all = apart(p, frame.camera, 0, beside(0, 0, r));
         EXPECT_GT(all.judged, 700);
@@ -227,7 +229,8 @@ TEST_F(AoGpu, TheExactPathSeesTheSame) {
     field::worlds::World w = plane_world(0.05f);
     w.edits.push_back(edit(Sphere{.radius = r}, {0, r, 0}));
     const Frame frame = looking_down(w);
-    const Apart all = apart(open(frame, {.width = 128, .height = 96, .analytic = true}), frame.camera, 0, beside(0, 0, r));
+    const Apart all =
+        apart(open(frame, {.width = 128, .height = 96, .analytic = true}), frame.camera, 0, beside(0, 0, r));
     EXPECT_GT(all.judged, 700);
     EXPECT_LE(all.worst, 0.055) << "the ball has six voxels";
     EXPECT_LE(all.mean, 0.007);
@@ -281,7 +284,8 @@ TEST_F(AoGpu, WhatMovesTakesItsContactShadowWithIt) {
         const vec3 at{-0.4f + 0.137f * float(i), r, 0.3f - 0.051f * float(i)};
         const Pose pose{at, axis_angle({0.6f, 0.8f, 0}, 0.7f * float(i))};
         frame.instances = {Instance{.bricks = set, .pose = pose, .before = pose}};
-        const Picture p = open(frame, {.width = 128, .height = 96, .ao = i % 2 == 0 ? AmbientOcclusion::Full : AmbientOcclusion::Half});
+        const Picture p = open(
+            frame, {.width = 128, .height = 96, .ao = i % 2 == 0 ? AmbientOcclusion::Full : AmbientOcclusion::Half});
         const Apart all = apart(p, frame.camera, 0, beside(at.x, at.z, r, 0.7, 20));
         EXPECT_GT(all.judged, 1200);
         EXPECT_LE(all.worst, i % 2 == 0 ? 0.04 : 0.1) << i;
@@ -313,17 +317,18 @@ TEST_F(AoGpu, MeshesHideAndAreHidden) {
         std::vector<MeshInstance> meshes;
         bool at_half;  // is it met there?
     };
-    for (const Case& c : {Case{"field hides mesh", ball, {sheet}, true}, Case{"mesh hides field", plane_world(), {sphere}, false},
-                          Case{"mesh hides mesh", speck, {sheet, sphere}, false}}) {
+    for (const Case& c :
+         {Case{"field hides mesh", ball, {sheet}, true}, Case{"mesh hides field", plane_world(), {sphere}, false},
+          Case{"mesh hides mesh", speck, {sheet, sphere}, false}}) {
         Frame frame = looking_down(c.world);
         frame.meshes = c.meshes;
         const Apart full = apart(open(frame), frame.camera, 0, beside(0, 0, r));
         EXPECT_GT(full.judged, 700) << c.what;
         EXPECT_LE(full.worst, 0.045) << c.what;
         EXPECT_LE(full.mean, 0.01) << c.what;
-        const Apart half =
-            apart(open(frame, {.width = 128, .height = 96, .ao = AmbientOcclusion::Half}), frame.camera, 0,
-                  c.at_half ? beside(0, 0, r) : [](vec3 p) { return std::hypot(p.x, p.z) < 0.2f ? -1.0 : 1.0; });
+        const Apart half = apart(
+            open(frame, {.width = 128, .height = 96, .ao = AmbientOcclusion::Half}), frame.camera, 0,
+            c.at_half ? beside(0, 0, r) : [](vec3 p) { return std::hypot(p.x, p.z) < 0.2f ? -1.0 : 1.0; });
         EXPECT_LE(half.worst, c.at_half ? 0.07 : 0) << c.what << ", half";
     }
 }
@@ -461,7 +466,8 @@ TEST_F(AoGpu, PixelsAreThoseOfTheJudge) {
     w.edits.push_back(edit(Sphere{.radius = 0.2f}, {0.4f, 0.2f, 0.2f}));
     Frame frame = frame_of(w, {0.9f, 1.1f, 1.7f});
     frame.camera.target = {0.05f, 0.15f, 0.1f};
-    frame.meshes = {meshes::at(meshes::sphere(0.15f, 32, meshes::of_material(frame.materials[0])), {-0.3f, 0.15f, 0.5f})};
+    frame.meshes = {
+        meshes::at(meshes::sphere(0.15f, 32, meshes::of_material(frame.materials[0])), {-0.3f, 0.15f, 0.5f})};
     const MeshSet set = make_mesh_set(frame);
     const MeshTrace trace(set);
     const auto program = frame.field->program();

@@ -50,12 +50,12 @@ Buffer occlude(Graph& g, const TileInputs& in, Surface& surface) {
     const uint64_t groups = uint64_t{(size.width + side - 1) / side} * ((size.height + side - 1) / side);
     const FieldHandles& f = in.field;
     const InstanceHandles& i = in.instances;
-    const AoPush push{.node_count = i ? i.node_count : 0, .picture = in.picture, .every = every, .rays = every == 1 ? 8u : 4u};
+    const AoPush push{
+        .node_count = i ? i.node_count : 0, .picture = in.picture, .every = every, .rays = every == 1 ? 8u : 4u};
     Image points = g.create("ao points", {.size = size, .format = rhi::Format::Rgba32Uint});
     Buffer counted = g.create_buffer("ao evaluations", groups * 4);
-    std::vector<Use> uses{g.uniform(in.frame),     g.read(f.cells),      g.read(in.rays),
-                          g.sampled(f.distances),  g.read(surface.seen), g.read(surface.words),
-                          g.write(points),         g.write(counted)};
+    std::vector<Use> uses{g.uniform(in.frame),  g.read(f.cells),       g.read(in.rays), g.sampled(f.distances),
+                          g.read(surface.seen), g.read(surface.words), g.write(points), g.write(counted)};
     if (in.exact) uses.insert(uses.end(), {g.read(f.records), g.read(f.code), g.read(f.program), g.read(f.numbers)});
     if (in.levels) uses.push_back(g.uniform(in.levels_block));
     g.dispatch(ao_kernel(in), size, uses, push);
@@ -71,8 +71,8 @@ Buffer occlude(Graph& g, const TileInputs& in, Surface& surface) {
     if (in.has_meshes && every == 1) {
         const MeshHandles& m = in.meshes;
         Image left = g.create("ao points", {.size = size, .format = rhi::Format::Rgba32Uint});
-        std::vector<Use> of_meshes{g.uniform(in.frame), g.read(in.rays),      g.read(m.parts), g.read(m.corners),
-                                   g.read(m.vertices),  g.read(m.surfaces),   g.read(m.nodes), g.read(surface.seen),
+        std::vector<Use> of_meshes{g.uniform(in.frame), g.read(in.rays),    g.read(m.parts), g.read(m.corners),
+                                   g.read(m.vertices),  g.read(m.surfaces), g.read(m.nodes), g.read(surface.seen),
                                    g.read(points),      g.write(left)};
         for (const Image& page : m.pages) of_meshes.push_back(g.read(page));
         of_meshes.push_back(g.sampler({.mip = rhi::Filter::Linear, .address = rhi::AddressMode::Repeat}));
