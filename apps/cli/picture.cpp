@@ -21,7 +21,8 @@ constexpr std::string_view kTiers[] = {"auto", "compute", "rt", "mesh"};
 constexpr std::string_view kQualities[] = {"low", "medium", "high", "ultra", "auto"};
 constexpr std::string_view kShadows[] = {"rays", "cascades"};
 constexpr std::string_view kLightings[] = {"clusters", "volumes"};
-constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
+constexpr std::string_view kAos[] = {"off", "half", "full"};
+constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels", "ao"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
@@ -54,7 +55,7 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     if (!known) {
         const std::string_view near = nearest_word(o.view, kViews);
         return usage("--view " + o.view + ": there is no such view; " +
-                     (near.empty() ? "use shaded, albedo, normal, depth, steps, bricks or levels"
+                     (near.empty() ? "use shaded, albedo, normal, depth, steps, bricks, levels or ao"
                                    : "did you mean " + std::string(near) + "?"));
     }
     const auto tier = std::find(std::begin(kTiers), std::end(kTiers), o.tier);
@@ -77,6 +78,13 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
         return usage("--lighting " + o.lighting + ": there is no such lighting; " +
                      (near.empty() ? "use clusters or volumes" : "did you mean " + std::string(near) + "?"));
     }
+    const auto ao = std::find(std::begin(kAos), std::end(kAos), o.ao);
+    if (!o.ao.empty() && ao == std::end(kAos)) {
+        const std::string_view near = nearest_word(o.ao, kAos);
+        return usage("--ao " + o.ao + ": there is no such ambient occlusion; " +
+                     (near.empty() ? "use off, half or full" : "did you mean " + std::string(near) + "?"));
+    }
+    if (!o.ao.empty()) s.ao = AmbientOcclusion(ao - std::begin(kAos));
     s.lighting = LightTechnique(lighting - std::begin(kLightings));
     if (!(o.scale >= 0.25f && o.scale <= 1)) return usage("--scale wants a number from 0.25 to 1");
     if (o.scale < 1 && !o.taa && o.quality != "ultra")
@@ -128,6 +136,7 @@ std::string_view choose_quality(const PictureOptions& o, const Renderer& rendere
     const RenderSettings asked = s;
     set_quality(s, quality);
     if (!o.shadows.empty()) s.mesh_shadows = asked.mesh_shadows;
+    if (!o.ao.empty()) s.ao = asked.ao;
     if (o.transparent_layers) s.transparent_layers = asked.transparent_layers;
     if (o.no_refine) s.refine = false;
     if (o.taa) s.taa = true;

@@ -24,6 +24,7 @@ struct PictureOptions {
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high
     std::string shadows;                ///< of meshes: rays or cascades; empty: as the quality says, else rays
+    std::string ao;                     ///< off, half or full; empty: as the quality says, full without one
     std::string lighting = "clusters";  ///< clusters or volumes
     float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;

@@ -20,7 +20,7 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
     verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     verb->add_option("--camera", o->camera, "a camera's name; left out: the scene's first");
-    verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps, bricks or levels")
+    verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps, bricks, levels or ao")
         ->capture_default_str();
     verb->add_option("--device", o->device, "auto, cpu-vulkan or part of a device's name")->capture_default_str();
     verb->add_option("--tier", o->tier,
@@ -54,6 +54,9 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("--scale", o->scale,
                      "with --taa: rays a pixel along each side, 0.25 to 1; the picture is made whole over time")
         ->capture_default_str();
+    verb->add_option("--ao", o->ao,
+                     "ambient occlusion: off, half (rays of one pixel in four) or full; left out: what --quality says, "
+                     "else full");
     verb->add_option("--lighting", o->lighting,
                      "of lamps and spots: clusters (lists by tile), or volumes (rasterised and added up): the same "
                      "picture")

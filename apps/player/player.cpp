@@ -49,7 +49,7 @@ constexpr int kRungOfProcessor = 2;
 constexpr double kSlow = 0.066, kQuick = 0.012;  // seconds a frame
 constexpr int kFramesARung = 40;                 // a change costs the picture's history
 constexpr double kSecondsARung = 2;              // … and frames that take long are not waited for so often
-constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels"};
+constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels", "ao"};
 
 std::string digits(const char* format, double value) {
     char buffer[64];

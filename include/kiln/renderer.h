@@ -73,7 +73,7 @@ struct Environment {
     friend bool operator==(const Environment&, const Environment&) = default;
 };
 
-enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels };
+enum class View : uint8_t { Shaded, Albedo, Normal, Depth, Steps, Bricks, Levels, Ao };
 
 /// Something that moves as a whole: bricks of its own, in a frame of its own, which a pose puts into the world. Moving one bakes nothing.
 struct Instance {
@@ -154,6 +154,10 @@ enum class MeshShadows : uint8_t { Rays, Cascades };
 /// added by blending, as deferred renderers began; the same picture to the rounding of half floats.
 enum class LightTechnique : uint8_t { Clusters, Volumes };
 
+/// Ambient occlusion: light from all around reaches a point by the share of its hemisphere that is open, by rays through the field, what moves and
+/// meshes. Half: rays for a pixel of four, and only the field and what moves are met.
+enum class AmbientOcclusion : uint8_t { Off, Half, Full };
+
 struct RenderSettings {
     int width = 1280, height = 720;  ///< pixels, 1 to 16384
     View view = View::Shaded;
@@ -181,13 +185,15 @@ struct RenderSettings {
     int shadow_map_side = 0;  ///< Cascades: texels, a power of two from 64 to 8192; 0: as the picture's size asks
     int glass_bounces =
         4;  ///< times that glass may throw light back inside, [0, 16]; 0: and its mirror shows no other glass
+    AmbientOcclusion ao = AmbientOcclusion::Full;
     bool shown_alone = false;  ///< of a shaded picture only `srgb` is brought from the device, for whoever shows it
 };
 
 /// What a picture may cost. Low: hard shadows, of meshes by maps; two things of glass behind one another, which throw no light back inside; surfaces as the
-/// bricks have them. Medium: the same shadows and glass. High: everything that one picture can show. Ultra: anti-aliased over time too.
+/// bricks have them; no ambient occlusion. Medium: the same shadows and glass, ambient occlusion at half size. High: everything that one picture can show. Ultra:
+/// anti-aliased over time too.
 enum class Quality : uint8_t { Low, Medium, High, Ultra };
-/// Sets `refine`, `soft_shadows`, `mesh_shadows`, `transparent_layers`, `glass_bounces` and `taa`, no more.
+/// Sets `refine`, `soft_shadows`, `mesh_shadows`, `transparent_layers`, `glass_bounces`, `ao` and `taa`, no more.
 void set_quality(RenderSettings& settings, Quality quality);
 
 /// Pixels, top row first.

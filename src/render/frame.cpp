@@ -3,6 +3,7 @@
 
 #include "base/format.h"
 #include "render/lib/pack.h"
+#include "render/passes/ao.h"
 #include "render/passes/cascades.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
@@ -28,6 +29,12 @@ std::pair<int, int> rays_of(const RenderSettings& settings) {
         return std::clamp(int(std::lround(double(settings.scale) * pixels)), 1, std::max(pixels, 1));
     };
     return {of(settings.width), of(settings.height)};
+}
+
+uint32_t ao_every(const RenderSettings& settings) {
+    if (settings.view == View::Ao) return settings.ao == AmbientOcclusion::Half ? 2 : 1;
+    if (settings.view != View::Shaded || settings.ao == AmbientOcclusion::Off) return 0;
+    return settings.ao == AmbientOcclusion::Half ? 2 : 1;
 }
 
 shade::CameraParams of_rays(shade::CameraParams camera, int across, int down) {
@@ -111,7 +118,8 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.flags = (settings.accelerate ? kFrameAccelerate : 0u) | (settings.analytic ? kFrameAnalytic : 0u) |
               (settings.analytic && settings.unpruned ? kFrameUnpruned : 0u) |
               (settings.refine && !settings.analytic ? kFrameRefine : 0u) |
-              (settings.cull_lights ? 0u : kFrameAllLights) | (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
+              (settings.cull_lights ? 0u : kFrameAllLights) | (ao_every(settings) != 0 ? kFrameAmbient : 0u) |
+              (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
@@ -156,6 +164,7 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
     Surface surface = resolve(g, in, words, refined);
     resolve_instances(g, in, words, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
+    if (in.ao_every > 0) out.evaluations.push_back(g.readback(occlude(g, in, surface)));
     if (wanted == View::Shaded) {
         Image radiance = light(g, in, surface.seen, surface);
         Front front = draw_through(g, in, surface, radiance);
@@ -218,7 +227,7 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
     if (in.refine) refine_instances(g, in, seen.words, refined);
     if (in.has_meshes && !in.cull_meshes) seen.mesh_ids = draw_clusters(g, in).ids;
     TileResult out = record_shading(g, in, wanted, seen.words, refined, seen.mesh_ids);
-    out.evaluations = std::move(seen.evaluations);
+    out.evaluations.insert(out.evaluations.begin(), seen.evaluations.begin(), seen.evaluations.end());
     out.mesh_numbers = std::move(seen.mesh_numbers);
     return out;
 }
@@ -248,6 +257,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     instance_kernels(in, view == View::Shaded, out);
     if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
     if (in.cull_meshes) out.insert(out.end(), {&kDepthPyramid, &kDepthPyramidRest, &kMeshCull, &kMeshPack, &kMeshPick});
+    ao_kernels(in, out);
     if (view != View::Shaded) {
         out.push_back(&kView);
         return out;

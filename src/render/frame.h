@@ -12,6 +12,8 @@ namespace kiln::render {
 
 // Rays across and down: fewer than pixels where settings.scale is below 1.
 std::pair<int, int> rays_of(const RenderSettings& settings);
+// TileInputs::ao_every of a picture.
+uint32_t ao_every(const RenderSettings& settings);
 // The camera with so many.
 shade::CameraParams of_rays(shade::CameraParams camera, int across, int down);
 

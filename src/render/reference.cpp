@@ -92,12 +92,20 @@ struct Scene {
             return tint() * shade::EnvironmentLight{settings.environment->words}.environment_radiance(d);
         return shade::sky_radiance(with_sun ? sky : sky_no_sun, d);
     }
-    // Light from all around, unoccluded.
-    vec3 around(const SurfaceView& s) const {
-        if (!settings.environment) return shade::shade_sky(s, sky_no_sun);
-        shade::EnvironmentLight light{settings.environment->words};
-        return tint() * shade::shade_around(s, light.environment_ambient(s.n),
-                                            light.environment_reflection(shade::reflected_view(s), s.optics.roughness));
+    // Light from all around, where so much of it arrives.
+    vec3 around(const SurfaceView& s, float open) const {
+        const vec3 mirror = shade::reflected_view(s);
+        vec3 ambient, reflection;
+        if (settings.environment) {
+            shade::EnvironmentLight light{settings.environment->words};
+            ambient = tint() * light.environment_ambient(s.n);
+            reflection = tint() * light.environment_reflection(mirror, s.optics.roughness);
+        } else {
+            ambient = shade::sky_ambient(sky_no_sun, s.n);
+            reflection = shade::sky_reflection(sky_no_sun, mirror, s.alpha);
+        }
+        return settings.sky_samples > 0 ? shade::shade_around_seen(s, ambient, reflection, open)
+                                        : shade::shade_around(s, ambient, reflection) * open;
     }
 
     bool reaches(dvec3 p, dvec3 direction, double distance) const {
@@ -177,10 +185,26 @@ double disc_distance(const LightSample& light, const Scene& scene) {
     return light.distance >= 1e30f ? scene.settings.farthest : double(light.distance);
 }
 
+// Share of the hemisphere that is open, and no more than a texture leaves.
+float open_share(const Scene& scene, const Hit& hit, Random& random) {
+    const int side = int(std::lround(std::sqrt(double(scene.settings.sky_samples))));
+    if (side == 0) return hit.ambient;
+    const gpu::Basis b = gpu::basis_around(hit.n);
+    int open = 0;
+    for (int i = 0; i < side * side; ++i) {
+        const double u = (i % side + double(random.next())) / side, v = (i / side + double(random.next())) / side;
+        const vec2 d = on_disc(u, v);
+        const vec3 up =
+            b.tangent * d.x + b.bitangent * d.y + hit.n * std::sqrt(std::max(1 - d.x * d.x - d.y * d.y, 0.0f));
+        open += scene.reaches(hit.p, wide(normalize(up)), scene.settings.farthest);
+    }
+    return std::min(hit.ambient, float(open) / float(side * side));
+}
+
 // samples = 0: as the lighting pass does it, with the visible fraction counted by rays.
-vec3 direct(const Scene& scene, const Hit& hit, dvec3 direction, Random& random) {
+vec3 direct(const Scene& scene, const Hit& hit, dvec3 direction, Random& random, float open) {
     const SurfaceView s = view_of(scene, hit, direction);
-    vec3 sum = scene.around(s) * hit.ambient + hit.material.emissive;
+    vec3 sum = scene.around(s, open) + hit.material.emissive;
     for (const LightRecord& record : scene.lights) {
         const LightSample light = shade::sample_light(record, narrow(hit.p));
         if (dot(hit.n, light.l) <= 0 || largest3(light.illuminance) <= 0) continue;
@@ -373,6 +397,7 @@ ReferencePicture render_reference(const ReferenceField& field, std::span<const L
                          std::vector<float>(count * 4),
                          std::vector<float>(count, float(kInfinity)),
                          std::vector<vec3>(count),
+                         std::vector<float>(count, 1.0f),
                          std::vector<float>(count)};
     parallel_for(int(count), settings.workers, [&](int i) {
         const size_t at = size_t(i);
@@ -385,7 +410,10 @@ ReferencePicture render_reference(const ReferenceField& field, std::span<const L
         if (hit.t >= 0) {
             out.depth[at] = float(hit.t);
             out.normal[at] = hit.n;
-            if (settings.samples == 0) sum = direct(scene, hit, middle, middle_random);
+            if (settings.samples == 0) {
+                out.open[at] = open_share(scene, hit, middle_random);
+                sum = direct(scene, hit, middle, middle_random, out.open[at]);
+            }
             covered = 1;
         } else if (settings.samples == 0) {
             sum = scene.radiance(middle, true);

@@ -2,7 +2,7 @@
 // The slow judge of pictures: a CPU renderer over any distance field, in double precision, with the shaders' own texts for
 // surface, lights, sky and camera. Two ways:
 //   samples = 0: what the real-time renderer claims to draw. One ray through each pixel's middle, every light with the
-//     visible fraction of its disc, the sky's light unoccluded.
+//     visible fraction of its disc, the sky's light unoccluded or by the share of the hemisphere that is open.
 //   samples > 0: what is true. Path tracing with next-event estimation; the sky and all bounces occlude each other.
 // Results are the same bytes for any number of workers: every pixel has its own random sequence.
 #pragma once
@@ -45,8 +45,10 @@ struct ReferenceSettings {
     int samples = 0;           // paths a pixel; 0: direct light alone, see above
     bool whole_pixels = true;  // paths start all over the pixel; false: through its middle, as the real-time renderer's
     int shadow_samples = 64;   // rays to each light's disc, with samples = 0
-    int most_bounces = 16;     // 0: light that comes straight from the lights, and emission
-    bool lambert = false;      // surfaces without reflection: for closed forms
+    int sky_samples =
+        0;  // … and over the hemisphere, a square number: what AmbientOcclusion claims; 0: the sky's light unoccluded
+    int most_bounces = 16;  // 0: light that comes straight from the lights, and emission
+    bool lambert = false;   // surfaces without reflection: for closed forms
     uint32_t seed = 1;
     int workers = 0;                                     // 0: every core
     const shade::EnvironmentMap* environment = nullptr;  // an image all around, multiplied by the constant sky
@@ -55,9 +57,11 @@ struct ReferenceSettings {
 
 struct ReferencePicture {
     int width = 0, height = 0;
-    std::vector<float> rgba;            // scene-linear, before exposure; alpha 1 where something is hit
-    std::vector<float> depth;           // metres along the ray through the pixel's middle; +infinity: nothing
-    std::vector<vec3> normal;           // there; (0, 0, 0) where nothing is hit
+    std::vector<float> rgba;   // scene-linear, before exposure; alpha 1 where something is hit
+    std::vector<float> depth;  // metres along the ray through the pixel's middle; +infinity: nothing
+    std::vector<vec3> normal;  // there; (0, 0, 0) where nothing is hit
+    std::vector<float>
+        open;  // share of the hemisphere, with sky_samples; else what a texture leaves; 1 where nothing is hit
     std::vector<float> standard_error;  // of a pixel's luminance; 0 with samples < 2
 };
 

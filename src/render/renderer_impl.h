@@ -132,6 +132,7 @@ struct Renderer::Impl {
         in.upscales = in.taa && settings.scale < 1;
         in.jitter = jitter;
         in.picture = in.taa && settings.taa_jitter ? uint32_t(taa_frame & 0xffffu) : 0;
+        in.ao_every = ao_every(settings);
         if (settings.lighting == LightTechnique::Volumes && settings.view == View::Shaded)
             in.volume_count = uint32_t(std::count_if(frame.lights.begin(), frame.lights.end(), is_somewhere));
         in.outline_count = uint32_t(outlined.records.size());

@@ -216,8 +216,8 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                 sum += n & ~kWalkedTree;
                 stats.instance_tiles_by_tree += n >> 31;
             }
-            stats.evaluations += sum;
             const std::string pass = counted.name().substr(0, counted.name().find(" evaluations"));
+            if (pass.starts_with("march")) stats.evaluations += sum;
             const auto same = std::find_if(stats.pass_evaluations.begin(), stats.pass_evaluations.end(),
                                            [&](const auto& p) { return p.first == pass; });
             if (same != stats.pass_evaluations.end())

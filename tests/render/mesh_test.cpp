@@ -213,7 +213,7 @@ TEST_F(MeshGpu, PicturesAreThoseOfTheJudge) {
                                .meshes = &trace};
     Frame plain = frame;
     for (Material& m : plain.materials) m = kClay;
-    const Picture drawn = picture(plain, View::Shaded, 96, 72);
+    const Picture drawn = rhi::must(renderer->render(plain, {.width = 96, .height = 72, .ao = AmbientOcclusion::Off}));
     const ReferencePicture truth = render_reference(judge, frame.lights, shade::sky_params(frame), frame.camera,
                                                     {.width = 96, .height = 72, .shadow_samples = 256});
     int off = 0, hits = 0;

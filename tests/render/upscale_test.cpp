@@ -25,7 +25,8 @@ TEST(Upscale, RoundsOfTheJitterFillThePixelsThatAreShown) {
 struct UpscaleGpu : PicturesOverTime {
     // Of fewer rays, each in all the pixels that it covers.
     image::Rgb blocks(const Frame& frame, int by) {
-        const Picture small = rhi::must(renderer->render(frame, {.width = kWidth / by, .height = kHeight / by}));
+        const Picture small = rhi::must(
+            renderer->render(frame, {.width = kWidth / by, .height = kHeight / by, .ao = AmbientOcclusion::Off}));
         image::Rgb out;
         out.width = kWidth, out.height = kHeight;
         for (int y = 0; y < kHeight; ++y)
@@ -162,7 +163,8 @@ TEST_F(UpscaleGpu, LinesAndOutlinesAreDrawnAtTheSizeThatIsShown) {
     EXPECT_GT(green[0], 60);
     EXPECT_NEAR(green[1], green[0], 0.25 * green[0]);
     // Distances are those of the rays.
-    const Picture fewer = rhi::must(renderer->render(frame, {.width = kWidth / 2, .height = kHeight / 2}));
+    const Picture fewer =
+        rhi::must(renderer->render(frame, {.width = kWidth / 2, .height = kHeight / 2, .ao = AmbientOcclusion::Off}));
     p = picture(frame, {.taa = true, .taa_jitter = false, .scale = 0.5f});
     for (int y = 0; y < kHeight; ++y)
         for (int x = 0; x < kWidth; ++x)

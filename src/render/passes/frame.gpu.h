@@ -47,6 +47,7 @@ KILN_CONST uint kFrameUnpruned = 8u;         // march the whole program
 KILN_CONST uint kFrameOutsideConcave = 16u;  // half-spaces alone leave the grid: their field is concave along a ray
 KILN_CONST uint kFrameAllLights = 64u;       // every light at every pixel: the slow twin of the lists
 KILN_CONST uint kFrameRayEnds = 128u;        // march's rays end behind the meshes that are drawn already
+KILN_CONST uint kFrameAmbient = 256u;        // the G-buffer's ambient visibility is that of the hemisphere
 KILN_CONST uint kFrameRefine = 32u;          // points of bricks are moved to where their code has the surface
 
 // A ray given from outside (tests, queries): origin in voxels, unit direction.

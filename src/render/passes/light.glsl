@@ -66,14 +66,19 @@ void main() {
     SurfaceSample surface = unpack_surface(texelFetch(surface_words, pixel, 0));
     SurfaceView view = surface_view(surface_optics(surface.albedo, surface.metallic, surface.roughness), surface.normal, -ray.direction);
     if (first) {
-        vec3 around;
+        vec3 ambient;
+        vec3 reflection;
         if (kImageSky) {
-            around = shade_around(view, environment_ambient(view.n), environment_reflection(reflected_view(view), view.optics.roughness));
-            around *= frame.sky.c0.rgb;
+            ambient = environment_ambient(view.n) * frame.sky.c0.rgb;
+            reflection = environment_reflection(reflected_view(view), view.optics.roughness) * frame.sky.c0.rgb;
         } else {
-            around = shade_sky(view, frame.sky);
+            ambient = sky_ambient(frame.sky, view.n);
+            reflection = sky_reflection(frame.sky, reflected_view(view), view.alpha);
         }
-        sum = surface.emissive + surface.ambient * around;
+        if ((frame.flags & kFrameAmbient) != 0u)
+            sum = surface.emissive + shade_around_seen(view, ambient, reflection, surface.ambient);
+        else
+            sum = surface.emissive + surface.ambient * shade_around(view, ambient, reflection);
     }
     uvec4 fractions = texelFetch(visible_fractions, pixel, 0);
 #ifdef KILN_GLASS

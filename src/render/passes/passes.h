@@ -174,6 +174,7 @@ struct TileInputs {
     rhi::Extent shown_size;     // of the picture: else `size`
     vec2 jitter;                // where in its pixels this frame looks
     uint32_t picture = 0;       // of the row of pictures that becomes one over time
+    uint32_t ao_every = 0;      // pixel of a row, and row, has rays of ambient occlusion; 0: there is none
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.

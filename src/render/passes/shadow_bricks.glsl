@@ -29,9 +29,4 @@ vec3 empty_cell(bool solid, int jump, vec3 in_cell, vec3 direction) {
     return vec3(kFarAway, least, min(min(leaves.x, leaves.y), leaves.z) + kPastFace);
 }
 
-// How far off a surface found at t its shadow rays start, finest voxels: a voxel of what it was found in; a pixel, where pixels are larger.
-float shadow_offset(uint state, float voxel, float t) {
-    float off = max(voxel, 1.5 * frame.pixel_angle * t);
-    // What bricks hold is exact to a voxel: farther would leave small hollows.
-    return state != kSeenOutside ? min(off, 2.0 * voxel) : off;
-}
+#include "render/passes/shadow_offset.glsl"

@@ -3,6 +3,7 @@
 // what the bent rays see, as they drew what the camera sees. One step a surface: who is nearest along the rays as they are (those that rest
 // cost little), what it looks like, where light goes on. What is solid where they end is lit once, behind the last step. Order follows from
 // the rays, so whoever comes first in a list changes nothing.
+#include "render/passes/ao.h"
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
 
@@ -67,6 +68,7 @@ Image light_along(Graph& g, const TileInputs& in, const Image& seen) {
     Surface surface = resolve(g, in, seen, refined);
     resolve_instances(g, in, seen, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
+    if (in.ao_every > 0) (void)occlude(g, in, surface);
     return light(g, in, surface.seen, surface);
 }
 

@@ -5,6 +5,7 @@
 //   depth   metres along the ray; shown as t / (t + 1), near is dark, misses white
 //   steps   cells and samples along the ray, 0 … 1 for 0 … 256, as a heat map
 //   bricks  a colour a brick or instance, shaded by the normal
+//   ao      share of the hemisphere that is open; shown as it is; misses white
 //   levels  a colour a level of the clipmap, finest first: red, orange, yellow, green, blue, violet, and again; what no brick shows is grey
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
@@ -27,6 +28,7 @@ const uint kViewNormal = 2u;
 const uint kViewDepth = 3u;
 const uint kViewSteps = 4u;
 const uint kViewLevels = 6u;
+const uint kViewAo = 7u;
 
 vec3 level_color(uint level) {
     const vec3 kColors[6] = vec3[6](vec3(0.80, 0.10, 0.08), vec3(0.85, 0.38, 0.05), vec3(0.80, 0.72, 0.10), vec3(0.15, 0.55, 0.15), vec3(0.08, 0.25, 0.75), vec3(0.45, 0.12, 0.62));
@@ -70,6 +72,9 @@ void main() {
     } else if (frame.view == kViewSteps) {
         value = vec3(float(seen.w & 0xffffu) / 256.0);
         color = heat(value.x);
+    } else if (frame.view == kViewAo) {
+        value = vec3(hit ? s.ambient : 1.0);
+        color = value;
     } else if (hit) {
         uint state = seen.y >> 28u;
         vec3 brick = state == kSeenBrick || state == kSeenPruned || state == kSeenInstance ? number_color(seen.y & 0x0fffffffu) : vec3(0.5);

@@ -1,0 +1,9 @@
+#version 460
+// SPDX-License-Identifier: MIT
+// Ambient occlusion by bricks of all levels.
+#extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_samplerless_texture_functions : require
+#include "render/passes/frame.gpu.h"
+#define KILN_LEVELS
+#include "field/levels.gpu.h"
+#include "render/passes/ao.glsl"
