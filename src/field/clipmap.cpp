@@ -691,10 +691,10 @@ bool Clipmap::work(const BakeBudget& budget) {
     Run run{budget.bricks, std::isfinite(budget.seconds), {}, options_.workers};
     Run all{.workers = options_.workers};
     uint32_t layers = budget.layers;
+    const auto after = [](double seconds) {
+        return Clock::now() + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
+    };
     if (run.timed) {
-        const auto after = [began = Clock::now()](double seconds) {
-            return began + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(seconds));
-        };
         const double moved = std::chrono::duration<double>(moved_).count();
         run.deadline = after(std::max(budget.seconds - moved, kLeastShare * budget.seconds));
         // What waits to be settled costs rays steps in the meantime.
@@ -717,7 +717,8 @@ bool Clipmap::work(const BakeBudget& budget) {
     else if (net_)
         fill_net(first, all);
     run.spend(levels_[size_t(first)].counts.baked);
-    if (net_ && last < at_once && at_once < first) fill_net(at_once, run);
+    // However long that took: were nothing else made, the net would be needed for ever.
+    if (run.timed) run.deadline = std::max(run.deadline, after(kLeastShare * budget.seconds));
     std::vector<int> changes;
     bool missing = false;
     for (int level = 0; level < all_levels(); ++level) {

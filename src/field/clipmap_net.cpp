@@ -5,7 +5,7 @@
 // Each of the net's levels has the last one's extent in half as many cells a side as the level before it, so the coarsest needs no more than
 // kNetBricks bricks, whatever the world is. The finest one that needs no more than a frame has, in the worst of worlds, is made at once: so no
 // frame exceeds its budget where that is kNetBricks or more, and none shows a hole. Where a frame has so much time, how many bricks that is
-// is not known: the coarsest is made at once, and the finer one in pieces. The levels between are left out: each would cost about
+// is not known: then the net is its coarsest level alone. The levels between are left out: each would cost about
 // what the last level costs, since what coarse bricks lack in number their code has in length. Where the last level ends, the picture has a
 // step until it is whole. A net that is not needed has no bricks, and no change costs it anything.
 
