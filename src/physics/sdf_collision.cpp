@@ -18,9 +18,9 @@ constexpr float kAlike =
     0.9f;  // cosine: starts that the field faces so like a place already found lead there, after kSure descents
 constexpr size_t kSure = 2;
 constexpr int kShellSteps = 8;
-constexpr float kEnoughShell =
-    1e-5f;  // of the distance of shell points: a step that gains less ends a walk. A place is then right to
-            // a fortieth of that on a ball: it rolls with its lowest point, and does not sink
+// Of the distance of shell points: a step that gains less ends a walk. What is at least half as thick as it is wide rolls on what stands:
+// with its lowest point, to a fortieth of that distance, it neither sinks nor is slowed.
+constexpr float kEnoughRolling = 1e-5f, kEnoughOtherwise = 1e-3f, kThick = 0.5f;
 constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
 constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
 constexpr float kTouch = 0.25f;        // of the margin: apart by no more counts as lying on it
@@ -374,6 +374,9 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
         std::array<Probe, kMostSeeds> now;
         std::array<size_t, kMostSeeds> going;  // numbers of the seeds that still walk
         size_t walking = count;
+        const vec3 half = shell.bounds().half_extents();
+        const bool rolls = !other.moves() && float(shell.inner_radius()) > kThick * std::max({half.x, half.y, half.z});
+        const float enough = (rolls ? kEnoughRolling : kEnoughOtherwise) * shell.spacing();
         const auto look = [&](const field::SdfField& field, const std::array<vec3, kMostSeeds>& points, size_t n) {
             field.distances(std::span(points.data(), n), value.data(), slope.data());
         };
@@ -409,7 +412,7 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
                 const float gain = found_back ? there.depth - now[i].depth : -shell.spacing();
                 if (gain > 0) now[i] = there;
                 if (gain < 0) step[i] *= 0.3f;
-                if (!(std::abs(gain) < kEnoughShell * shell.spacing())) going[still++] = i;
+                if (!(std::abs(gain) < enough)) going[still++] = i;
             }
             walking = still;
         }

@@ -177,37 +177,37 @@ TEST_P(MeshedGround, ASlideAcrossRegionsKeepsItsEnergyAndNeverKicks) {
 }
 
 TEST_P(MeshedGround, ASlideOverAMeshedHillKeepsItsEnergyAndNeverKicks) {
-    // Flat, over a hill of radius 20 m, and flat again, along the border of two rows of regions and across the one on the top.
-    constexpr float kCoarse = 2 * kCell, kCoarseSide = 2 * kSide;
+    // Flat, over a hill of radius 30 m, and flat again, along the border of two rows of regions and across three.
     const std::vector<Edit> edits{edit(Plane{}, {0, 0.03f, 0}),
-                                  edit(kiln::Sphere{.radius = 20}, {0, -19.7f, 0}, Op::Union, 3)};
+                                  edit(kiln::Sphere{.radius = 30}, {0, -29.8f, 0}, Op::Union, 3)};
     Scene s(GetParam());
-    const BodyId ground =
-        s.add({.shape = fixed(edits, kCoarse), .motion = Motion::Static, .friction = 0, .mesh_voxel = kCoarse});
-    for (const float x : {-0.5f * kCoarseSide, 0.5f * kCoarseSide})
+    const BodyId ground = s.add(ground_of(edits, true, 0));
+    for (const float x : {-1.5f * kSide, -0.5f * kSide, 0.5f * kSide})
         for (const float z : {-2.0f, 2.0f})
             s.add({.shape = Convex::box({0.2f, 0.2f, 0.2f}), .pose = {{x, 0.5f, z}, {}}});
     s.run(kLanded);
-    ASSERT_GE(meshed_regions(s, ground), 4u);
+    ASSERT_GE(meshed_regions(s, ground), 6u);
     for (const Solid& solid : {solids()[0], solids()[1], solids()[2]}) {
         const bool lies = solid.convex.kind == Convex::Kind::Capsule;
         const float height = (lies ? solid.convex.size.x : half_extents(solid.convex).y) + 0.03f;
         const BodyId id = s.add({.shape = solid.exact(),
-                                 .pose = {{-15, height, 0.01f}, lies ? axis_angle({0, 0, 1}, kPi / 2) : quat{}},
+                                 .pose = {{-17, height, 0.01f}, lies ? axis_angle({0, 0, 1}, kPi / 2) : quat{}},
                                  .friction = 0,
                                  .linear_velocity = {6, 0, 0}});
         int kicks = 0;
-        for (int i = 0; i < 320; ++i) {
+        for (int i = 0; i < 340; ++i) {
             const float before = s.world->state(id).linear_velocity.y;
             s.world->step(kStep);
             kicks += std::abs(s.world->state(id).linear_velocity.y - before) > 0.3f;
         }
         EXPECT_EQ(kicks, 0) << solid.name;
         const BodyState state = s.world->state(id);
-        EXPECT_GT(state.pose.position.x, 12) << solid.name;
+        EXPECT_GT(state.pose.position.x, 10) << solid.name;
         const float energy =
             dot(state.linear_velocity, state.linear_velocity) / 2 + kGravity * (state.pose.position.y - height);
-        EXPECT_NEAR(energy / 18, 1, 0.01f) << solid.name;
+        // Jolt takes places that face alike within five degrees for one manifold with one normal: what is long loses a little more there.
+        const bool one_normal = GetParam() == "jolt" && solid.convex.kind != Convex::Kind::Sphere;
+        EXPECT_NEAR(energy / 18, 1, one_normal ? 0.015f : 0.01f) << solid.name;
         s.world->remove(id);
     }
 }

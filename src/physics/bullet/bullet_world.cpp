@@ -130,37 +130,46 @@ public:
                                                   constraint_count, info, draw, dispatcher);
     }
 
+    btVector3 gravity{0, 0, 0};
+
 private:
     static constexpr int kStorey = 4, kFew = 12, kMany = 40;
     static constexpr float kFast = 1;  // m/s
     static constexpr float kEnough = 1e-7f;
 
-    // The most contacts between a body and what does not move, by the shortest way, as far as it matters; that of `moving` bodies
-    // that nothing holds is all of them.
+    // The most bodies between one and the ground, itself counted, by the shortest way down that carries it, as far as it matters. A wall
+    // carries nobody; what nothing carries falls, and bears nothing.
     int storeys(std::span<btPersistentManifold* const> manifolds, int moving) {
         constexpr int kTop = kMany / kStorey;
-        const auto moves = [](const btCollisionObject* o) { return !o->isStaticOrKinematicObject(); };
+        constexpr float kCarries = 0.3f;  // sine of the least slope of a push that holds somebody up
+        const float pull = gravity.length();
+        if (!(pull > 0)) return kTop;
         const auto height = [&](const btCollisionObject* o) -> int& {
             const size_t i = size_t(o->getUserIndex());
             if (i >= height_.size()) height_.resize(i + 1, kTop);
             return height_[i];
         };
+        constexpr int kFalls = 1 << 20;
         for (const btPersistentManifold* m : manifolds)
-            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()}) height(o) = moves(o) ? kTop : 0;
+            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
+                height(o) = o->isStaticOrKinematicObject() ? 0 : kFalls;
         bool lower = true;
         while (lower) {
             lower = false;
             for (const btPersistentManifold* m : manifolds) {
-                if (m->getNumContacts() == 0) continue;
                 int &a = height(m->getBody0()), &b = height(m->getBody1());
-                if (a > b + 1) a = b + 1, lower = true;
-                if (b > a + 1) b = a + 1, lower = true;
+                for (int i = 0; i < m->getNumContacts(); ++i) {
+                    const float up = -m->getContactPoint(i).m_normalWorldOnB.dot(gravity) / pull;  // of body 0
+                    if (up > kCarries && a > b + 1) a = b + 1, lower = true;
+                    if (up < -kCarries && b > a + 1) b = a + 1, lower = true;
+                }
             }
         }
         int out = 1;
         for (const btPersistentManifold* m : manifolds)
-            if (m->getNumContacts() > 0) out = std::max({out, height(m->getBody0()), height(m->getBody1())});
-        return std::min(out, moving);
+            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
+                if (height(o) < kFalls) out = std::max(out, height(o));
+        return std::min({out, moving, kTop});
     }
     std::vector<int> height_;  // by the body's index
 };
@@ -186,6 +195,7 @@ public:
     explicit BulletWorld(const WorldSettings& settings) : World(settings.gravity) {
         set_globals();
         dynamics_.setGravity(to_bullet(settings.gravity));
+        solver_.gravity = dynamics_.getGravity();
         dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
         btContactSolverInfo& solver = dynamics_.getSolverInfo();
         // One direction of friction lets stacks creep sideways; with two, the plain solver makes a stack of ten boxes sway more and more.

@@ -29,6 +29,7 @@ namespace {
 using namespace JPH;
 
 constexpr EShapeSubType kType = EShapeSubType::User1;
+constexpr float kAlike = 0.9962f;   // cosine of 5 degrees, as Jolt has it for normals of one manifold
 constexpr float kWorldSize = 1e5f;  // of what has no end: the tree of boxes wants finite ones
 // Jolt keeps contacts between steps, and sorts them, by the numbers of the parts that touch. A field's parts are the directions it faces.
 // Contacts of one pair that face alike within five degrees are one to Jolt (PhysicsSettings::mContactNormalCosMaxDeltaRotation), others
@@ -58,25 +59,48 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
     }
 }
 
-// Hits on meshes of regions, of which those on aprons are let go.
+// Hits on meshes of regions, of which those on aprons are let go. Those that point elsewhere than
+// the field does are of edges of facets, by which a box that glides into a hollow would be stopped: they are told as the field has them.
 class OwnHits final : public CollideShapeCollector {
 public:
-    OwnHits(CollideShapeCollector& to, const Regions& regions, const Pose& ground_from_space, uint bits_before)
-        : CollideShapeCollector(to), to_(to), regions_(regions), pose_(ground_from_space), bits_(bits_before + 1) {}
+    OwnHits(CollideShapeCollector& to, const SdfShape& ground, const Pose& world_from_ground, float margin,
+            uint bits_before)
+        : CollideShapeCollector(to),
+          to_(to),
+          ground_(ground),
+          world_(world_from_ground),
+          local_(inverse(world_from_ground)),
+          margin_(margin),
+          bits_(bits_before + 1) {}
     void AddHit(const CollideShapeResult& hit) override {
         SubShapeID id = hit.mSubShapeID2, rest;
         (void)id.PopID(bits_, rest);
-        const Regions::Entry* e = regions_.numbered(rest.PopID(kRegionBits, id));
-        if (e == nullptr || !is_own(*e->mesh, pose_ * to_vec(hit.mContactPointOn2))) return;
+        const Regions::Entry* e = ground_.regions()->numbered(rest.PopID(kRegionBits, id));
+        if (e == nullptr || !is_own(*e->mesh, local_ * to_vec(hit.mContactPointOn2))) return;
+        static thread_local std::vector<FieldContact> one;
+        one.assign(1, {local_ * to_vec(hit.mContactPointOn1), {0, 1, 0}, hit.mPenetrationDepth});
+        measure(ground_, margin_, one);
+        if (one.empty()) return;
+        const Vec3 out = to_jolt(rotate(world_.rotation, one.front().normal));
         to_.SetContext(GetContext());
-        to_.AddHit(hit);
+        if (-hit.mPenetrationAxis.NormalizedOr(out).Dot(out) > kAlike) {
+            to_.AddHit(hit);
+            UpdateEarlyOutFraction(to_.GetEarlyOutFraction());
+            return;
+        }
+        CollideShapeResult as_field = hit;
+        as_field.mPenetrationAxis = -out;
+        as_field.mPenetrationDepth = one.front().depth;
+        as_field.mContactPointOn2 = hit.mContactPointOn1 + out * one.front().depth;
+        to_.AddHit(as_field);
         UpdateEarlyOutFraction(to_.GetEarlyOutFraction());
     }
 
 private:
     CollideShapeCollector& to_;
-    const Regions& regions_;
-    Pose pose_;
+    const SdfShape& ground_;
+    Pose world_, local_;
+    float margin_;
     uint bits_;
 };
 
@@ -92,7 +116,7 @@ void collide_meshed(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg 
     add(contacts, world, false, id1, id2.PushID(0, 1), collector);
     if (!triangles) return;
     // All of them together, so that an edge between two regions is seen to be an inner one.
-    OwnHits own(collector, *ground.sdf().regions(), inverse(world), id2.GetNumBitsWritten());
+    OwnHits own(collector, ground.sdf(), world, settings.mMaxSeparationDistance, id2.GetNumBitsWritten());
     InternalEdgeRemovingCollector inner(own, settings.mInternalEdgeRemovalVertexToleranceSq);
     CollideShapeSettings all = settings;
     all.mActiveEdgeMode = EActiveEdgeMode::CollideWithAll;
