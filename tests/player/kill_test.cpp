@@ -27,8 +27,8 @@ namespace {
 std::string scene() {
     std::string out = R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "ground", "shape": "plane"})";
     for (int i = 0; i < 8; ++i)
-        for (const char* part : {R"("half_extents": [0.1, 0.5, 0.1], "position": [)",
-                                 R"("half_extents": [0.3, 0.2, 0.3], "position": [)"})
+        for (const char* part :
+             {R"("half_extents": [0.1, 0.5, 0.1], "position": [)", R"("half_extents": [0.3, 0.2, 0.3], "position": [)"})
             out += R"(, {"shape": "box", )" + std::string(part) + std::to_string(2 * i) +
                    (part[18] == '1' ? ", 0.5, 0]}" : ", 1.1, 0]}");
     return out + "]}";
