@@ -38,6 +38,10 @@ void FlyCamera::move(float right, float up, float ahead) {
     position_ = position_ + vec3{std::cos(yaw_), 0, std::sin(yaw_)} * right + vec3{0, up, 0} + forward() * ahead;
 }
 
+vec3 FlyCamera::along_ground(float right, float ahead) const {
+    return vec3{std::cos(yaw_), 0, std::sin(yaw_)} * right + vec3{std::sin(yaw_), 0, -std::cos(yaw_)} * ahead;
+}
+
 void FlyCamera::look(float x, float y) {
     yaw_ = std::remainder(yaw_ + x * kRadiansAPixel, 2 * kPi);
     pitch_ = std::clamp(pitch_ - y * kRadiansAPixel, -kSteepest, kSteepest);

@@ -17,6 +17,10 @@ public:
     vec3 forward() const;
     /// Metres to the right, up along the world's axis, and forward.
     void move(float right, float up, float forward);
+    /// To be at a place, looking as before.
+    void place(vec3 position) { position_ = position; }
+    /// Level, in the direction that it looks: so much to the right, and ahead.
+    vec3 along_ground(float right, float ahead) const;
     /// Pixels of the mouse, to the right and down.
     void look(float x, float y);
     /// Through the middle of a pixel of a picture of so many.

@@ -2,6 +2,7 @@
 #include "player/hud.h"
 
 #include <algorithm>
+#include <span>
 
 namespace kiln::player {
 
@@ -9,10 +10,14 @@ namespace {
 
 // The most useful first: narrow pictures show as many as have room.
 constexpr std::string_view kHints[] = {"left mouse digs", "right mouse + WASD flies",
-                                       "G throws",        "Ctrl+Z undoes",
+                                       "F walks",         "G throws",
+                                       "Ctrl+Z undoes",   "H all keys",
                                        "F1 profiler",     "P pauses",
                                        "R restarts",      "V views",
                                        "B adds",          "Esc quits"};
+constexpr std::string_view kWalkHints[] = {"WASD walks", "mouse looks", "left mouse digs", "Space jumps",
+                                           "Shift runs", "G throws",    "Ctrl+Z undoes",   "F flies",
+                                           "H all keys", "P pauses"};
 constexpr std::string_view kBetween = " \xc2\xb7 ";
 
 }  // namespace
@@ -25,7 +30,8 @@ std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
     int bottom = picture.height;
     if (hints) {
         std::string line;
-        for (const std::string_view hint : kHints) {
+        for (const std::string_view hint :
+             walks ? std::span<const std::string_view>(kWalkHints) : std::span<const std::string_view>(kHints)) {
             const std::string longer =
                 line.empty() ? std::string(hint) : line + std::string(kBetween) + std::string(hint);
             if (canvas.text_width(longer) + 2 * pad > picture.width) break;
@@ -43,14 +49,34 @@ std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
         canvas.text(pad, bar.y + pad, message, 255, 214, 140);
         out.emplace_back("message", bar);
     }
-    if (!profiler.empty()) {
-        int wide = 0;
-        for (const std::string& line : profiler) wide = std::max(wide, canvas.text_width(line));
-        const Rect box{0, 0, wide + 2 * pad, int(profiler.size()) * canvas.line_height() + 2 * pad};
-        canvas.fill(box, 12, 12, 14, 0.6f);
-        for (size_t i = 0; i < profiler.size(); ++i) canvas.text(pad, pad + int(i) * canvas.line_height(), profiler[i]);
-        out.emplace_back("profiler", box);
+    if (walks) {
+        // Light within dark, so that it is seen on anything.
+        const int x = picture.width / 2, y = picture.height / 2;
+        for (const int wide : {2 * scale, scale})
+            for (const bool level : {false, true}) {
+                const int a = 3 * scale + wide, b = (wide + 1) / 2;
+                const Rect bar = level ? Rect{x - a, y - b, 2 * a, 2 * b} : Rect{x - b, y - a, 2 * b, 2 * a};
+                const int shade = wide > scale ? 12 : 240;
+                canvas.fill(bar, shade, shade, shade, wide > scale ? 0.4f : 0.9f);
+            }
+        out.emplace_back("aim", Rect{x - 5 * scale, y - 5 * scale, 10 * scale, 10 * scale});
     }
+    const auto box_of = [&](const std::vector<std::string>& lines, bool middle, const char* id) {
+        if (lines.empty()) return;
+        int wide = 0;
+        for (const std::string& line : lines) wide = std::max(wide, canvas.text_width(line));
+        Rect box{0, 0, wide + 2 * pad, int(lines.size()) * canvas.line_height() + 2 * pad};
+        if (middle) {
+            box.x = std::max((picture.width - box.width) / 2, 0);
+            box.y = std::max((bottom - box.height) / 2, 0);
+        }
+        canvas.fill(box, 12, 12, 14, middle ? 0.8f : 0.6f);
+        for (size_t i = 0; i < lines.size(); ++i)
+            canvas.text(box.x + pad, box.y + pad + int(i) * canvas.line_height(), lines[i]);
+        out.emplace_back(id, box);
+    };
+    box_of(profiler, false, "profiler");
+    box_of(help, true, "help");
     return out;
 }
 

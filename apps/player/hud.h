@@ -13,7 +13,8 @@ namespace kiln::player {
 struct Hud {
     std::string message;                ///< shown above the hints; empty: none
     std::vector<std::string> profiler;  ///< lines; empty: not shown
-    bool hints = true;
+    std::vector<std::string> help;      ///< likewise, in the middle
+    bool hints = true, walks = false;   ///< walks: the middle of the picture is marked, and hints are of walking
 
     /// Draws over the picture and answers where each part is, by id.
     std::vector<std::pair<std::string, Rect>> draw(Picture& picture) const;

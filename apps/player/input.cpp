@@ -14,9 +14,9 @@ namespace kiln::player {
 namespace {
 
 constexpr std::string_view kKeys[] = {
-    "a", "b",      "d",          "e",           "f",         "g",          "k",  "p",  "q",  "r", "s", "v",
-    "w", "y",      "z",          "1",           "2",         "3",          "4",  "5",  "6",  "7", "8", "9",
-    ".", "escape", "left shift", "right shift", "left ctrl", "right ctrl", "f1", "f2", "f3", "f4"};
+    "a", "b",      "d",     "e", "f",          "g",           "k",         "p",          "q",  "r",  "s",  "v",
+    "w", "y",      "z",     "1", "2",          "3",           "4",         "5",          "6",  "7",  "8",  "9",
+    ".", "escape", "space", "h", "left shift", "right shift", "left ctrl", "right ctrl", "f1", "f2", "f3", "f4"};
 constexpr std::string_view kButtons[] = {"left", "middle", "right"};
 constexpr std::string_view kWords[] = {"frame", "key", "down", "mouse", "button", "look", "wheel", "size", "close"};
 constexpr int kMostFrame = 1'000'000'000;

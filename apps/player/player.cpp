@@ -34,8 +34,10 @@ constexpr int kFramesToRest =
     80;  // a round of the places in a pixel that rays go through, with a fourth as many of them
 constexpr float kBiteOfDistance = 0.03f;  // radius: as large on the screen from everywhere
 constexpr float kLeastBite = 0.1f, kMostBite = 0.8f;
-constexpr int kFramesABite = 10;                       // while the mouse stays where it is
-constexpr float kBallRadius = 0.25f, kBallSpeed = 14;  // metres, m/s
+constexpr int kFramesABite = 10;                                   // while the mouse stays where it is
+constexpr float kWalkSpeed = 3, kRunSpeed = 6, kJumpSpeed = 4.5f;  // m/s; jumps 1 m high
+constexpr float kEyes = 1.6f;                                      // metres over the feet
+constexpr float kBallRadius = 0.25f, kBallSpeed = 14;              // metres, m/s
 // What `auto` goes down by where frames take long: parts of the window's side that the picture has, and of the picture's that rays have;
 // then surfaces are as the bricks have them, which few rays hardly tell.
 struct Rung {
@@ -55,6 +57,16 @@ std::string digits(const char* format, double value) {
     char buffer[64];
     std::snprintf(buffer, sizeof buffer, format, value);
     return buffer;
+}
+
+std::vector<std::string> lines_of(std::string_view text) {
+    std::vector<std::string> out;
+    for (size_t at = 0; at <= text.size();) {
+        const size_t end = std::min(text.find('\n', at), text.size());
+        out.emplace_back(text.substr(at, end - at));
+        at = end + 1;
+    }
+    return out;
 }
 
 // A text file that appears whole or not at all.
@@ -83,7 +95,16 @@ private:
     Result<void> take(const InputEvent& event);
     Result<void> press(const std::string& key);
     void fly(float seconds);
+    void walk();
+    Result<void> start_or_stop_walking();
+    bool walks() const { return hud_.walks; }
+    void hold_mouse() {
+        if (window_ && o_.keys.empty()) window_->hold_mouse(walks() || input_.button("right"));
+    }
     Result<void> use_tools();
+    float axis(std::string_view more, std::string_view less) const {
+        return (input_.key(more) ? 1.0f : 0.0f) - (input_.key(less) ? 1.0f : 0.0f);
+    }
     RenderSettings settings() const;
     Result<Picture> draw(double seconds);
     void choose_rung(double seconds);
@@ -119,6 +140,7 @@ private:
     int frame_ = 0, message_until_ = 0, last_bite_ = 0, last_input_ = 0;
     vec3 bite_towards_{};
     float speed_ = 4;  // m/s
+    vec3 walk_{};      // m/s, wished
     bool paused_ = false, profiler_ = false, done_ = false;
     double frame_seconds_ = 0, work_seconds_ = 0, rung_seconds_ = 0;  // smoothed; work: without waiting for the screen
     size_t rung_ = 0;
@@ -217,12 +239,13 @@ Result<void> Player::take(const InputEvent& e) {
     case Kind::Key:
         return e.down ? press(e.name) : Result<void>();
     case Kind::Button:
-        if (e.name == "right" && window_ && o_.keys.empty()) window_->hold_mouse(e.down);
+        hold_mouse();
         break;
     case Kind::Look:
-        if (input_.button("right")) camera_->look(e.x, e.y);
+        if (walks() || input_.button("right")) camera_->look(e.x, e.y);
         break;
     case Kind::Wheel:
+        if (walks()) break;
         speed_ = std::clamp(speed_ * std::pow(1.2f, e.y), 0.05f, 500.0f);
         message("flies at " + digits("%.2g", double(speed_)) + " m/s");
         break;
@@ -240,7 +263,14 @@ Result<void> Player::take(const InputEvent& e) {
 Result<void> Player::press(const std::string& key) {
     const bool control = input_.key("left ctrl") || input_.key("right ctrl");
     if (key == "escape") {
-        done_ = true;
+        // What lies over the picture or holds the mouse goes first.
+        if (!hud_.help.empty()) {
+            hud_.help.clear();
+        } else if (walks()) {
+            return start_or_stop_walking();
+        } else {
+            done_ = true;
+        }
     } else if (control && (key == "z" || key == "y")) {
         auto done = key == "z" ? session_->undo() : session_->redo();
         if (!done) return done.error();
@@ -250,6 +280,15 @@ Result<void> Player::press(const std::string& key) {
         message(saved ? "saved " + *saved : saved.error().message);
     } else if (control) {
         return {};
+    } else if (key == "f") {
+        return start_or_stop_walking();
+    } else if (key == "space") {
+        session_->walk(walk_, kJumpSpeed);
+    } else if (key == "h") {
+        if (hud_.help.empty())
+            hud_.help = lines_of(player_keys());
+        else
+            hud_.help.clear();
     } else if (key == "p") {
         paused_ = !paused_;
         message(paused_ ? "paused; . makes one step" : "running");
@@ -285,28 +324,62 @@ Result<void> Player::press(const std::string& key) {
 
 void Player::fly(float seconds) {
     if (input_.key("left ctrl") || input_.key("right ctrl")) return;
-    const auto axis = [&](std::string_view more, std::string_view less) {
-        return (input_.key(more) ? 1.0f : 0.0f) - (input_.key(less) ? 1.0f : 0.0f);
-    };
+    if (walks()) return walk();
     const float way = seconds * speed_ * (input_.key("left shift") || input_.key("right shift") ? 4.0f : 1.0f);
     camera_->move(axis("d", "a") * way, axis("e", "q") * way, axis("w", "s") * way);
+}
+
+void Player::walk() {
+    const vec3 way = camera_->along_ground(axis("d", "a"), axis("w", "s"));
+    const float speed = input_.key("left shift") || input_.key("right shift") ? kRunSpeed : kWalkSpeed;
+    walk_ = way * (speed / std::max(1.0f, length(way)));
+    session_->walk(walk_, 0);
+}
+
+// Where the camera is, on what is below it.
+Result<void> Player::start_or_stop_walking() {
+    if (session_->behind() > 0) return {};
+    if (walks()) {
+        if (auto left = session_->leave(); !left) return left;
+        message("flying");
+    } else {
+        const vec3 eyes = camera_->position();
+        auto below = session_->play().cast({.origin = eyes, .direction = {0, -1, 0}});
+        if (!below) return below.error();
+        const bool solid = below->hit && below->t == 0;
+        if (!below->hit || solid) {
+            message(solid ? "no room to walk here; fly out of the ground" : "nothing to walk on below");
+            return {};
+        }
+        const auto entered = session_->enter(eyes - vec3{0, std::min(below->t, kEyes), 0});
+        message(entered ? "walking; F flies again" : entered.error().message);
+    }
+    hud_.walks = session_->walker().has_value();
+    hold_mouse();
+    return {};
 }
 
 Result<void> Player::use_tools() {
     const bool digs = input_.button("left"), adds = input_.button("middle") || input_.key("b");
     if (!digs && !adds) return session_->end_stroke();
     if (width_ <= 0 || height_ <= 0 || session_->behind() > 0) return {};
-    const Ray ray = camera_->ray(input_.x, input_.y, width_, height_);
-    auto hit = session_->play().cast(ray);
-    if (!hit) return hit.error();
+    const Ray ray = hud_.walks ? camera_->ray(float(width_) / 2, float(height_) / 2, width_, height_)
+                               : camera_->ray(input_.x, input_.y, width_, height_);
+    const auto picked = session_->play().pick(ray);
+    if (!picked) return picked.error();
+    const RayHit* const hit = &picked->hit;
     if (!hit->hit) return {};
+    if (!picked->body.empty() && !hit->edit) {
+        message("this is a mesh, which is not cut");
+        return {};
+    }
     const float radius = std::clamp(kBiteOfDistance * hit->t, kLeastBite, kMostBite);
     const vec3 at = digs ? hit->position : hit->position + hit->normal * (0.5f * radius);
     // A mouse that stays where it is drills on slowly, however deep the last bite was.
     const float beside = length(cross(ray.direction, bite_towards_)) * hit->t;
     if (session_->in_stroke() && frame_ - last_bite_ < kFramesABite && beside < 0.5f * radius) return {};
     session_->begin_stroke(digs ? "dig" : "add ground");
-    tell(session_->dig(at, radius, !digs));
+    tell(session_->dig(at, radius, !digs, picked->body));
     last_bite_ = frame_;
     bite_towards_ = ray.direction;
     return {};
@@ -337,6 +410,10 @@ std::string Player::ui_line(const std::vector<std::pair<std::string, Rect>>& wid
         places += (places.empty() ? "" : ", ") + ("\"" + id) + "\": [" + std::to_string(r.x) + ", " +
                   std::to_string(r.y) + ", " + std::to_string(r.width) + ", " + std::to_string(r.height) + "]";
     const PlayCounts counts = session_->counts();
+    std::string walker = "null";
+    if (const auto who = session_->walker())
+        walker = "[" + digits("%.3f", double(who->feet.x)) + ", " + digits("%.3f", double(who->feet.y)) + ", " +
+                 digits("%.3f", double(who->feet.z)) + "]";
     char hash[20];
     std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(session_->world_hash()));
     return "{\"frame\": " + std::to_string(frame_) + ", \"widgets\": {" + places +
@@ -345,12 +422,14 @@ std::string Player::ui_line(const std::vector<std::pair<std::string, Rect>>& wid
            ", " + std::to_string(height_) + "], \"view\": \"" + std::string(kViews[size_t(view_)]) +
            "\", \"paused\": " + (paused_ ? "true" : "false") + ", \"steps\": " + std::to_string(session_->steps()) +
            ", \"bodies\": " + std::to_string(counts.bodies) + ", \"awake\": " + std::to_string(counts.awake) +
-           ", \"parts\": " + std::to_string(counts.parts) + ", \"world\": \"" + hash + "\"}\n";
+           ", \"parts\": " + std::to_string(counts.parts) + ", \"walker\": " + walker + ", \"world\": \"" + hash +
+           "\"}\n";
 }
 
 Result<Picture> Player::draw(double seconds) {
     const FrameBudget budget =
         replays() ? FrameBudget{.bricks = kBakeBricks} : FrameBudget{.bricks = UINT32_MAX, .seconds = kBakeSeconds};
+    if (const auto who = session_->walker()) camera_->place(who->feet + vec3{0, kEyes, 0});
     auto frame = session_->play().frame(camera_->camera(), lines_, budget);
     if (!frame) return frame.error();
     RenderSettings s = settings();
@@ -447,10 +526,12 @@ Result<void> run_player(const PlayerOptions& options) {
 }
 
 std::string_view player_keys() {
-    return "left mouse        dig; what is cut off falls\n"
+    return "left mouse        dig, and cut bodies; what is cut off falls\n"
            "middle mouse, B   add ground\n"
-           "right mouse       look around; with W A S D fly, Q and E down and up, Shift faster; the wheel sets the "
-           "speed\n"
+           "right mouse       look around; with W A S D fly, Q and E down and up,\n"
+           "                  Shift faster; the wheel sets the speed\n"
+           "F                 walk, and fly again: W A S D, Shift runs, Space jumps,\n"
+           "                  the mouse looks; digs where the cross is\n"
            "G                 throw a ball\n"
            "Ctrl+Z, Ctrl+Y    undo a stroke or a throw, redo it\n"
            "P, .              pause, make one step\n"
@@ -458,7 +539,8 @@ std::string_view player_keys() {
            "K, Ctrl+S         make the world what the play made of it, save it\n"
            "V, 1 to 7         views\n"
            "F1 F2 F3 F4       profiler, contacts, shapes of bodies, sleeping bodies\n"
-           "Esc               quit";
+           "H                 these keys, over the picture\n"
+           "Esc               close them, stop walking, quit";
 }
 
 }  // namespace kiln::player

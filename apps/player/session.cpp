@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cstdio>
 #include <filesystem>
 #include <utility>
 
@@ -16,15 +17,28 @@ std::string number(float value) {
     return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
 }
 
+std::string quoted(const std::string& text) {
+    std::string out = "\"";
+    for (const char c : text) {
+        char buffer[8];
+        if (uint8_t(c) < 0x20) {
+            std::snprintf(buffer, sizeof buffer, "\\u%04x", unsigned(uint8_t(c)));
+            out += buffer;
+            continue;
+        }
+        if (c == '"' || c == '\\') out += '\\';
+        out += c;
+    }
+    return out + "\"";
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const std::string& backend) {
     std::unique_ptr<Session> out(new Session);
     out->scene_ = scene;
     out->backend_ = backend;
-    const auto bundled = bundled_scenes();
-    const bool is_bundled =
-        std::any_of(bundled.begin(), bundled.end(), [&](const auto& s) { return s.first == scene; });
+    const bool is_bundled = is_bundled_scene(scene);
     out->file_ = is_bundled ? scene + ".kiln.json" : scene;
     Result<World> world = Error{};
     if (!is_bundled) {
@@ -49,34 +63,47 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
 }
 
 Result<void> Session::start() {
-    play_.reset();
+    steps_ = 0;
+    if (play_) return play_->restart();
     auto play = Play::start(*base_, {.backend = backend_});
     if (!play) return play.error();
     play_.emplace(std::move(*play));
-    steps_ = 0;
+    return {};
+}
+
+Result<void> Session::tell(const Told& told) {
+    switch (told.what) {
+    case Told::What::Command:
+        if (auto done = play_->apply(told.command, told.of_world ? "a dig" : "a cut"); !done && told.of_world)
+            return done;
+        return {};  // a body that has not come about this time, or lies elsewhere, is not cut
+    case Told::What::Launch:
+        return play_->launch(told.edit, told.vector);
+    case Told::What::Enter:
+        return play_->enter(told.vector);
+    case Told::What::Walk:
+        play_->walk(told.vector, told.jump);
+        return {};
+    case Told::What::Leave:
+        play_->leave();
+        return {};
+    }
     return {};
 }
 
 Result<void> Session::perform_due() {
-    for (; next_due_ < due_.size() && due_[next_due_].at <= steps_; ++next_due_) {
-        const Due& due = due_[next_due_];
-        const auto done =
-            due.command ? play_->apply(*due.command, "a dig") : play_->launch(due.action->edit, due.action->velocity);
-        if (!done) return done;
-    }
+    for (; next_due_ < due_.size() && due_[next_due_].at <= steps_; ++next_due_)
+        if (auto done = tell(due_[next_due_]); !done) return done;
     return {};
 }
 
 Result<void> Session::run_again(int64_t to) {
     if (auto started = start(); !started) return started;
-    due_.clear();
+    due_ = walks_;
     next_due_ = 0;
-    for (size_t i = 0; i < done_; ++i) {
-        const Action& a = actions_[i];
-        for (const Action::Dig& dig : a.digs) due_.push_back({dig.at, &a, &dig.command});
-        if (a.kind == Action::Kind::Launch) due_.push_back({a.at, &a, nullptr});
-    }
-    std::stable_sort(due_.begin(), due_.end(), [](const Due& a, const Due& b) { return a.at < b.at; });
+    for (size_t i = 0; i < done_; ++i) due_.insert(due_.end(), actions_[i].told.begin(), actions_[i].told.end());
+    std::sort(due_.begin(), due_.end(),
+              [](const Told& a, const Told& b) { return a.at != b.at ? a.at < b.at : a.order < b.order; });
     wanted_ = to;
     return perform_due();
 }
@@ -104,9 +131,6 @@ Result<void> Session::advance(double seconds, double budget) {
 
 void Session::add(Action action) {
     actions_.resize(done_);
-    // What a play that is run again still had to be told pointed into them.
-    due_.clear();
-    next_due_ = 0;
     actions_.push_back(std::move(action));
     ++done_;
 }
@@ -115,7 +139,6 @@ void Session::begin_stroke(const std::string& title) {
     if (stroke_) return;
     History history = world_->history();
     stroke_.emplace();
-    stroke_->at = steps_;
     stroke_->parts_before = counts().parts;
     stroke_->before = history.now();
     history.begin_group(title);
@@ -125,51 +148,83 @@ Result<void> Session::end_stroke() {
     if (!stroke_) return {};
     Action stroke = std::move(*stroke_);
     stroke_.reset();
-    if (stroke.digs.empty()) return world_->history().cancel_group();
+    if (stroke.told.empty()) return world_->history().cancel_group();
     if (auto ended = world_->history().end_group(); !ended) return ended;
     stroke.after = world_->history().now();
     add(std::move(stroke));
     return {};
 }
 
-Result<void> Session::dig(vec3 at, float radius, bool add) {
+Result<void> Session::dig(vec3 at, float radius, bool add, const std::string& body) {
     if (!stroke_ || behind() > 0) return {};
-    std::string name;
-    do name = (add ? "heap" : "dig") + std::to_string(++named_);
-    while (world_->find_edit(name));
-    const std::string command = "{\"add\": {\"id\": \"" + name +
-                                "\", \"shape\": \"sphere\", \"radius\": " + number(radius) + ", \"position\": [" +
-                                number(at.x) + ", " + number(at.y) + ", " + number(at.z) + "], \"op\": \"" +
-                                (add ? "union" : "subtract") + "\", \"blend_radius\": " + number(radius * 0.25f) + "}}";
-    // Both or none.
-    if (auto applied = play_->apply(command, "a dig"); !applied) return applied;
-    if (auto applied = world_->apply(command, "a dig"); !applied) {
-        (void)play_->apply("{\"remove\": \"" + name + "\"}", "a dig");
-        return applied;
+    Told told = now(Told::What::Command);
+    told.of_world = body.empty();
+    do told.name = (add ? "heap" : "dig") + std::to_string(++named_);
+    while (world_->find_edit(told.name));
+    told.command = "{\"add\": {\"id\": \"" + told.name + "\", \"shape\": \"sphere\", \"radius\": " + number(radius) +
+                   ", \"position\": [" + number(at.x) + ", " + number(at.y) + ", " + number(at.z) + "], \"op\": \"" +
+                   (add ? "union" : "subtract") + "\", \"blend_radius\": " + number(radius * 0.25f) + "}";
+    if (!body.empty()) told.command += ", \"target\": " + quoted(body);
+    told.command += "}";
+    if (auto applied = play_->apply(told.command, "a dig"); !applied) return applied;
+    // What is cut from a body is the play's alone, as what it becomes is. Of the ground: both or none.
+    if (body.empty()) {
+        if (auto applied = world_->apply(told.command, "a dig"); !applied) {
+            (void)play_->apply("{\"remove\": \"" + told.name + "\"}", "a dig");
+            return applied;
+        }
+        hash_.reset();
+        dirty_ = true;
     }
-    hash_.reset();
-    dirty_ = true;
-    stroke_->digs.push_back({steps_, name, command});
+    stroke_->told.push_back(std::move(told));
     return {};
 }
 
 Result<void> Session::launch(const Edit& edit, vec3 velocity) {
     if (behind() > 0) return {};
     if (auto done = play_->launch(edit, velocity); !done) return done;
+    Told told = now(Told::What::Launch);
+    told.edit = edit;
+    told.vector = velocity;
     Action a;
     a.kind = Action::Kind::Launch;
-    a.at = steps_;
-    a.edit = edit;
-    a.velocity = velocity;
     a.before = a.after = world_->history().now();
+    a.told.push_back(std::move(told));
     add(std::move(a));
     return {};
 }
 
+Result<void> Session::enter(vec3 feet) {
+    if (behind() > 0) return {};
+    Told told = now(Told::What::Enter);
+    told.vector = feet;
+    if (auto done = tell(told); !done) return done;
+    walks_.push_back(std::move(told));
+    walk_ = {};
+    return {};
+}
+
+void Session::walk(vec3 velocity, float jump) {
+    if (behind() > 0 || !walker() || (velocity == walk_ && jump == 0)) return;
+    Told told = now(Told::What::Walk);
+    told.vector = walk_ = velocity;
+    told.jump = jump;
+    play_->walk(velocity, jump);
+    walks_.push_back(std::move(told));
+}
+
+Result<void> Session::leave() {
+    if (behind() > 0 || !walker()) return {};
+    walks_.push_back(now(Told::What::Leave));
+    return tell(walks_.back());
+}
+
 bool Session::fill_in(const Action& a) {
     if (behind() > 0 || a.kind != Action::Kind::Stroke || counts().parts != a.parts_before) return false;
-    for (size_t i = a.digs.size(); i-- > 0;)
-        if (!play_->apply("{\"remove\": \"" + a.digs[i].name + "\"}", "undo")) return false;
+    for (const Told& dig : a.told)
+        if (!dig.of_world) return false;
+    for (size_t i = a.told.size(); i-- > 0;)
+        if (!play_->apply("{\"remove\": \"" + a.told[i].name + "\"}", "undo")) return false;
     return true;
 }
 
@@ -187,12 +242,11 @@ Result<bool> Session::undo() {
 }
 
 Result<void> Session::perform(Action& a) {
-    a.at = steps_;
     a.parts_before = counts().parts;
-    if (a.kind == Action::Kind::Launch) return play_->launch(a.edit, a.velocity);
-    for (Action::Dig& dig : a.digs) {
-        dig.at = steps_;
-        if (auto done = play_->apply(dig.command, "redo"); !done) return done;
+    for (Told& told : a.told) {
+        told.at = steps_;
+        told.order = ++order_;
+        if (auto done = tell(told); !done) return done;
     }
     return {};
 }
@@ -205,17 +259,24 @@ Result<bool> Session::redo() {
     ++done_;
     hash_.reset();
     dirty_ = true;
-    const auto made = behind() > 0 ? run_again(std::max(wanted_, a.at)) : perform(a);
+    const auto made = behind() > 0 ? run_again(std::max(wanted_, a.told.empty() ? 0 : a.told.front().at)) : perform(a);
     if (!made) return made.error();
     return true;
 }
 
 Result<void> Session::restart() {
     if (auto ended = end_stroke(); !ended) return ended;
-    for (size_t i = 0; i < done_; ++i) {
-        Action& a = actions_[i];
-        a.at = 0;
-        for (Action::Dig& dig : a.digs) dig.at = 0;
+    for (size_t i = 0; i < done_; ++i)
+        for (Told& told : actions_[i].told) told.at = 0;
+    // Who walks goes on from where they are.
+    const auto who = walker();
+    walks_.clear();
+    walk_ = {};
+    if (who) {
+        Told told = now(Told::What::Enter);
+        told.at = 0;
+        told.vector = who->feet;
+        walks_.push_back(std::move(told));
     }
     return run_again(0);
 }
@@ -226,7 +287,6 @@ Result<void> Session::keep() {
     History history = world_->history();
     Action a;
     a.kind = Action::Kind::Keep;
-    a.at = steps_;
     a.before = history.now();
     // What the play has become holds all that was dug.
     if (auto gone = history.go_to(first_); !gone) return gone;

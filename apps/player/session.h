@@ -37,10 +37,15 @@ public:
     void begin_stroke(const std::string& title);
     Result<void> end_stroke();
     bool in_stroke() const { return stroke_.has_value(); }
-    /// A ball of ground taken away or put there, in a stroke. Nothing while the play is behind.
-    Result<void> dig(vec3 at, float radius, bool add);
+    /// A ball taken away or put there, in a stroke: of the ground, or of the body of that id. Nothing while the play is behind.
+    Result<void> dig(vec3 at, float radius, bool add, const std::string& body = {});
     /// Likewise, without a stroke.
     Result<void> launch(const Edit& edit, vec3 velocity);
+    /// Somebody walks (Play::enter), which a play that is run again does too, or does no more. Nothing while the play is behind.
+    Result<void> enter(vec3 feet);
+    void walk(vec3 velocity, float jump);
+    Result<void> leave();
+    std::optional<PlayWalker> walker() const { return play_->walker(); }
 
     /// False when there is none.
     Result<bool> undo();
@@ -62,17 +67,21 @@ public:
     uint64_t world_hash();
 
 private:
+    /// What the play was told, and when.
+    struct Told {
+        enum class What { Command, Launch, Enter, Walk, Leave } what = What::Command;
+        int64_t at = 0;      ///< steps made before it
+        uint64_t order = 0;  ///< among all of one time
+        std::string name{}, command{};
+        bool of_world = true;  ///< Command: of the ground, not of a body
+        Edit edit{};           ///< Launch
+        vec3 vector{};         ///< Launch, Walk: velocity; Enter: feet
+        float jump = 0;        ///< Walk
+    };
     struct Action {
         enum class Kind { Stroke, Launch, Keep } kind = Kind::Stroke;
-        int64_t at = 0;  ///< steps made before it
-        struct Dig {
-            int64_t at;
-            std::string name, command;
-        };
-        std::vector<Dig> digs{};  ///< Stroke
-        int parts_before = 0;     ///< that had come loose
-        Edit edit{};              ///< Launch
-        vec3 velocity{};
+        std::vector<Told> told{};        ///< digs of a stroke, or the one of a launch
+        int parts_before = 0;            ///< that had come loose
         uint32_t before = 0, after = 0;  ///< steps of the world's history
     };
 
@@ -85,6 +94,8 @@ private:
     /// Runs the play anew with the actions that are done.
     Result<void> run_again(int64_t to);
     Result<void> perform_due();
+    Result<void> tell(const Told& told);
+    Told now(Told::What what) { return {.what = what, .at = steps_, .order = ++order_}; }
     void add(Action action);
 
     std::string scene_, file_, backend_, note_;
@@ -96,13 +107,11 @@ private:
     size_t done_ = 0;     // of actions_
     uint32_t first_ = 0;  // step of the history that the base is
     int64_t steps_ = 0, wanted_ = 0;
-    struct Due {
-        int64_t at;
-        const Action* action;
-        const std::string* command;  // of a stroke
-    };
-    std::vector<Due> due_;  // that a play which is run again has still to be told, in order
+    std::vector<Told> walks_;  // of who walks, in order
+    std::vector<Told> due_;    // that a play which is run again has still to be told, in order
     size_t next_due_ = 0;
+    uint64_t order_ = 0;
+    vec3 walk_{};
     int named_ = 0;
     std::optional<uint64_t> hash_;
 };

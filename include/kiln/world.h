@@ -279,6 +279,10 @@ public:
     /// Of begin(): the world is what the play has become, with bodies and parts where they are, as one step.
     Result<void> keep();
 
+    /// Begins anew, as if it had been told nothing, at the cost of what moves: what was made of the world at first is used again, and
+    /// the next frame costs what differs from the last. Not of begin().
+    Result<void> restart();
+
     /// One fixed step: commands whose time has come, then physics.
     Result<void> step();
     /// So much time has gone by: makes the steps that are due, four at most (what is more is dropped, and counted), and answers how many.

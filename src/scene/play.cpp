@@ -69,6 +69,7 @@ Result<Frame> Simulation::frame(const Camera& camera, float between, const PlayL
         const Pose pose = blend({w.before, {}}, {w.character.position(), {}}, between);
         if (auto moved = (*world)->move(*edit, pose); !moved) return moved.error();
     }
+    fit_field();
     auto frame = (*world)->frame(camera, budget);
     if (!frame) return frame;
     move_meshes(*frame, between);
@@ -170,6 +171,16 @@ Result<void> Play::stop() {
 Result<void> Play::keep() {
     if (!session_) return Error{"playing: say which world keeps it, or begin() with one", ErrorKind::Usage};
     return session_->keep(*simulation_);
+}
+
+Result<void> Play::restart() {
+    if (session_) return Error{"playing: what begin() began does not begin anew; stop it first", ErrorKind::Usage};
+    auto again = scene::Simulation::again(*simulation_);
+    if (!again) return again.error();
+    simulation_ = std::move(*again);
+    ahead_ = 0;
+    between_ = 1;
+    return {};
 }
 
 Result<void> Play::step() {

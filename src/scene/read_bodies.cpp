@@ -56,8 +56,7 @@ using Owners = std::unordered_map<std::string_view, std::string_view>;  // bodie
 bool read_body(ValueReader& in, JsonIndex at, const BodyNames& names, Owners& owners, SceneBody& out) {
     const JsonDocument& doc = in.doc;
     const auto edits = doc.find(at, "edits"), mesh = doc.find(at, "mesh");
-    if (bool(edits) == bool(mesh))
-        return in.fail(at, "a body has either \"edits\" or a \"mesh\"; give it one of them");
+    if (bool(edits) == bool(mesh)) return in.fail(at, "a body has either \"edits\" or a \"mesh\"; give it one of them");
     if (mesh && !names.meshes.contains(doc.text(*mesh))) return in.unknown_name(*mesh, "mesh", known(names.meshes));
     const JsonIndex id = *doc.find(at, "id");
     out.id = doc.text(id);
@@ -131,8 +130,8 @@ bool read_ids(ValueReader& in, JsonIndex at, Ids& out) {
         const JsonIndex id = *doc.find(c, "id");
         if (doc.text(id).empty()) return in.fail(id, "an empty id; give it a name");
         if (const auto [old, fresh] = out.emplace(doc.text(id), n); !fresh)
-            return in.fail(id, formatted("{}[{}] has this id too; ids are unique, choose another", doc.key(at),
-                                         old->second));
+            return in.fail(
+                id, formatted("{}[{}] has this id too; ids are unique, choose another", doc.key(at), old->second));
     }
     return true;
 }

@@ -37,8 +37,9 @@ std::string command_in(const std::string& line) {
 
 }  // namespace
 
-Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const SimulateSettings& settings) {
-    std::unique_ptr<Simulation> out(new Simulation(start));
+Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const SimulateSettings& settings,
+                                                     Simulation* old) {
+    std::unique_ptr<Simulation> out(new Simulation(start, settings));
     const SceneData& data = start.impl_->data;
     const int threads = settings.threads > 0 ? settings.threads : std::max(1, int(std::thread::hardware_concurrency()));
     auto world = physics::make_world(settings.backend, {.gravity = data.physics.gravity, .threads = threads});
@@ -48,13 +49,18 @@ Result<std::unique_ptr<Simulation>> Simulation::make(const World& start, const S
     out->commands_ = settings.edits;
     for (const SceneBody& b : data.bodies) out->owned_.insert(b.edits.begin(), b.edits.end());
     out->edits_ = ground_of(*start.impl_, out->owned_);
-    out->voxel_size_ = start.impl_->resolution(*start.impl_->compiled(), start.field_settings).voxel_size;
+    out->voxel_size_ = old != nullptr
+                           ? old->voxel_size_
+                           : start.impl_->resolution(*start.impl_->compiled(), start.field_settings).voxel_size;
     out->near_ = 8 * out->voxel_size_;
     out->mesh_voxel_ = settings.mesh_ground ? out->voxel_size_ : 0;
+    if (old != nullptr) out->beginning_ = old->beginning_;
     if (auto done = out->set_ground({}); !done) return done.error();
-    if (auto done = out->add_bodies(settings); !done) return done.error();
+    if (auto done = out->add_bodies(old); !done) return done.error();
     if (auto done = out->add_triggers(); !done) return done.error();
     if (auto done = out->add_characters(); !done) return done.error();
+    if (old != nullptr && old->live_)
+        if (auto done = out->take_live(*old); !done) return done.error();
     return out;
 }
 
@@ -88,16 +94,25 @@ std::shared_ptr<const physics::SdfShape> Simulation::ground_shape(const Box3& ch
 }
 
 Result<void> Simulation::set_ground(const Box3& changed) {
-    auto list = field_of(live_ ? *live_->impl_ : *start_.impl_, edits_);
-    if (!list) return list.error();
-    ground_ = std::move(*list);
+    if (!ground_body_ && beginning_.ground) {
+        ground_ = beginning_.ground;
+        bricks_ = beginning_.bricks;
+    } else {
+        auto list = field_of(live_ ? *live_->impl_ : *start_.impl_, edits_);
+        if (!list) return list.error();
+        ground_ = std::move(*list);
+    }
     if (ground_body_) {
         world_->set_field(*ground_body_, ground_shape(changed), changed);
         return {};
     }
     if (ground_->bounds().empty()) return {};
     const SceneData& data = start_.impl_->data;
-    auto added = add({.shape = ground_shape(changed),
+    const bool anew = bricks_ != nullptr;
+    auto shape = anew ? physics::SdfShape::fixed(ground_, bricks_) : ground_shape(changed);
+    beginning_.ground = ground_;
+    beginning_.bricks = bricks_;
+    auto added = add({.shape = std::move(shape),
                       .motion = physics::Motion::Static,
                       .friction = data.physics.friction,
                       .restitution = data.physics.restitution,
@@ -111,9 +126,10 @@ Result<void> Simulation::set_ground(const Box3& changed) {
     return {};
 }
 
-Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
+Result<void> Simulation::add_bodies(const Simulation* old) {
     World::Impl& impl = *start_.impl_;
-    for (const SceneBody& body : impl.data.bodies) {
+    for (size_t i = 0; i < impl.data.bodies.size(); ++i) {
+        const SceneBody& body = impl.data.bodies[i];
         const auto wrong = [&](const std::string& message) { return fault(body.place, body.id, message); };
         std::vector<Edit> edits;
         if (!body.mesh.empty()) {
@@ -129,39 +145,13 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
         }
         const physics::Pose frame = frame_of(edits.front());
         edits = in_frame_of_first(std::move(edits));
-        physics::BodySettings s{.motion = physics::Motion(body.motion),
-                                .pose = frame,
-                                .density = body.numbers.density,
-                                .friction = body.numbers.friction,
-                                .restitution = body.numbers.restitution,
-                                .linear_damping = body.numbers.linear_damping,
-                                .angular_damping = body.numbers.angular_damping,
-                                .continuous = body.continuous,
-                                .linear_velocity = body.numbers.linear_velocity,
-                                .angular_velocity = body.numbers.angular_velocity,
-                                .rolling_friction = body.numbers.rolling_friction};
-        if (const auto convex = settings.field_bodies ? std::nullopt : convex_of(edits)) {
-            s.shape = *convex;
-        } else {
-            auto field = field_of(impl, edits);
-            if (!field) return wrong(field.error().message);
-            if (!body.mesh.empty())
-                if (auto closed = check_closed(body, edits.front()); !closed) return wrong(closed.error().message);
-            const Box3 box = (*field)->bounds();
-            if (body.motion == SceneBody::Motion::Static) {
-                s.shape = physics::SdfShape::fixed(*field);
-            } else {
-                auto bricks = box.finite() && !box.empty() ? field::BrickField::of_body(*field, voxel_size_) : nullptr;
-                auto shape = physics::SdfShape::moving(std::move(*field), std::move(bricks));
-                if (!shape) return wrong(shape.error().message);
-                s.shape = std::move(*shape);
-                // What a mesh bounds once has the mass that its triangles say, more exactly than a grid does.
-                if (const auto mass = body.mesh.empty() ? std::nullopt : exact_mass(edits.front()))
-                    s.shape = std::get<std::shared_ptr<const physics::SdfShape>>(s.shape)->with(*mass);
-            }
+        if (old == nullptr) {
+            auto made = settings_of(body, edits);
+            if (!made) return wrong(made.error().message);
+            made->pose = frame;
+            beginning_.bodies.push_back(std::move(*made));
         }
-        if (body.of_materials) s.surfaces = surfaces_of(impl.data);
-        if (auto added = add(s, body.id); !added) return wrong(added.error().message);
+        if (auto added = add(beginning_.bodies[i], body.id); !added) return wrong(added.error().message);
         members_.back().edits = std::move(edits);
         if (!body.edits.empty()) members_.back().edit = body.edits.front();
         if (!body.settles) continue;
@@ -171,6 +161,42 @@ Result<void> Simulation::add_bodies(const SimulateSettings& settings) {
             {members_.size() - 1, *impl.edits[impl.edits.find(body.edits.front())].edit, (*own)->bounds()});
     }
     return {};
+}
+
+// But for its pose.
+Result<physics::BodySettings> Simulation::settings_of(const SceneBody& body, const std::vector<Edit>& edits) {
+    World::Impl& impl = *start_.impl_;
+    physics::BodySettings s{.motion = physics::Motion(body.motion),
+                            .density = body.numbers.density,
+                            .friction = body.numbers.friction,
+                            .restitution = body.numbers.restitution,
+                            .linear_damping = body.numbers.linear_damping,
+                            .angular_damping = body.numbers.angular_damping,
+                            .continuous = body.continuous,
+                            .linear_velocity = body.numbers.linear_velocity,
+                            .angular_velocity = body.numbers.angular_velocity,
+                            .rolling_friction = body.numbers.rolling_friction};
+    if (body.of_materials) s.surfaces = surfaces_of(impl.data);
+    if (const auto convex = settings_.field_bodies ? std::nullopt : convex_of(edits)) {
+        s.shape = *convex;
+        return s;
+    }
+    auto field = field_of(impl, edits);
+    if (!field) return field.error();
+    if (!body.mesh.empty())
+        if (auto closed = check_closed(body, edits.front()); !closed) return closed.error();
+    if (body.motion == SceneBody::Motion::Static) {
+        s.shape = physics::SdfShape::fixed(*field);
+        return s;
+    }
+    const Box3 box = (*field)->bounds();
+    auto bricks = box.finite() && !box.empty() ? field::BrickField::of_body(*field, voxel_size_) : nullptr;
+    auto shape = physics::SdfShape::moving(std::move(*field), std::move(bricks));
+    if (!shape) return shape.error();
+    // What a mesh bounds once has the mass that its triangles say, more exactly than a grid does.
+    const auto mass = body.mesh.empty() ? std::nullopt : exact_mass(edits.front());
+    s.shape = mass ? (*shape)->with(*mass) : std::move(*shape);
+    return s;
 }
 
 // A mesh collides as the solid that it bounds: an edit of its file, where the mesh is.
@@ -243,9 +269,45 @@ Result<World*> Simulation::live() {
         auto copy = World::parse(start_.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
         if (!copy) return copy.error();
         live_ = std::move(*copy);
+        // What moves does not change what the field covers, nor how finely.
+        if (live_->field_settings.levels == 1) {
+            const auto r = live_->impl_->resolution(live_->impl_->list, live_->field_settings);
+            live_->field_settings.voxel_size = r.voxel_size;
+            live_->field_settings.bounds = r.bounds;
+        }
         if (auto done = show_characters(); !done) return done.error();
+        (void)live_->history();  // from here on
+        beginning_.live_names = live_->impl_->names_given;
     }
     return &*live_;
+}
+
+Result<void> Simulation::take_live(Simulation& old) {
+    live_ = std::move(old.live_);
+    old.live_.reset();
+    World::Impl& impl = *live_->impl_;
+    if (auto gone = live_->history().go_to(0); !gone) return gone;
+    impl.names_given = beginning_.live_names;
+    // Bodies that came about are behind those of the scene and its characters; of those that settled it is known again what they are.
+    impl.data.bodies.resize(start_.impl_->data.bodies.size() + walkers_.size());
+    std::copy(start_.impl_->data.bodies.begin(), start_.impl_->data.bodies.end(), impl.data.bodies.begin());
+    impl.apart_anew();
+    for (size_t i = 0; i < walkers_.size(); ++i) {
+        walkers_[i].shown = old.walkers_[i].shown;
+        owned_.insert(walkers_[i].shown);
+    }
+    meshes_shown_ = std::move(old.meshes_shown_);
+    return {};
+}
+
+// Ground that has come about beyond what the field covers is drawn too.
+void Simulation::fit_field() {
+    FieldSettings& settings = live_->field_settings;
+    if (settings.levels != 1 || start_.field_settings.bounds || !settings.bounds) return;
+    const Box3 solid = live_->impl_->compiled()->bounds;
+    if (solid.empty() || !solid.finite() || box_union(solid, *settings.bounds) == *settings.bounds) return;
+    // With room for more, since all of it is made again.
+    settings.bounds = box_union(*settings.bounds, live_->impl_->resolution(*live_->impl_->compiled(), {}).bounds);
 }
 
 std::optional<std::string> Simulation::changed_body() const {

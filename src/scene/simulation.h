@@ -27,7 +27,11 @@ namespace kiln::scene {
 class Simulation {
 public:
     /// `start` stays as it is and must outlive the simulation.
-    static Result<std::unique_ptr<Simulation>> make(const World& start, const SimulateSettings& settings);
+    static Result<std::unique_ptr<Simulation>> make(const World& start, const SimulateSettings& settings) {
+        return make(start, settings, nullptr);
+    }
+    /// From the start again, by what an old one, which is at its end then, made of it at first. The same steps to the bit.
+    static Result<std::unique_ptr<Simulation>> again(Simulation& old) { return make(old.start_, old.settings_, &old); }
 
     /// Commands whose time has come, then one fixed step.
     Result<void> step();
@@ -98,8 +102,14 @@ public:
     const std::vector<Event>& events() const { return events_; }
 
 private:
-    explicit Simulation(const World& start) : start_(start) {}
-    Result<void> add_bodies(const SimulateSettings& settings);
+    Simulation(const World& start, const SimulateSettings& settings) : start_(start), settings_(settings) {}
+    static Result<std::unique_ptr<Simulation>> make(const World& start, const SimulateSettings& settings,
+                                                    Simulation* old);
+    /// Takes the live world of another one, as it was at the start.
+    Result<void> take_live(Simulation& old);
+    void fit_field();
+    Result<void> add_bodies(const Simulation* old);
+    Result<physics::BodySettings> settings_of(const SceneBody& body, const std::vector<Edit>& edits);
     std::vector<SceneMesh> meshes_now() const;
     std::vector<SceneBody> bodies_now() const;
     std::vector<SceneCharacter> characters_now() const;
@@ -171,6 +181,14 @@ private:
     Error fault(JsonIndex place, const std::string& id, const std::string& message) const;
 
     const World& start_;
+    const SimulateSettings settings_;
+    // What the start was made into, for whoever begins there again.
+    struct Beginning {
+        std::shared_ptr<const field::ProgramField> ground{};
+        std::shared_ptr<const field::BrickField> bricks{};
+        std::vector<physics::BodySettings> bodies{};
+        uint64_t live_names = 0;
+    } beginning_;
     std::unique_ptr<physics::World> world_;
     physics::Triggers triggers_;
     std::vector<std::string> trigger_names_;  // by index

@@ -63,6 +63,7 @@ Result<void> Simulation::launch(Edit edit, vec3 velocity) {
             s.shape = std::move(*shape);
         }
         if (auto body = add(s, edit.name); !body) return body.error();
+        members_.back().edits = own;
         members_.back().edit = edit.name;
         loose_.push_back({members_.size() - 1, placed, box});
         return box;
@@ -112,7 +113,7 @@ Result<PlayHit> Simulation::pick(const Ray& ray) {
 PlayCounts Simulation::counts() const {
     PlayCounts out{.parts = parts_};
     for (const Member& m : members_) {
-        if (m.rest || !(m.mass.mass > 0)) continue;
+        if (m.rest || m.gone || !(m.mass.mass > 0)) continue;
         ++out.bodies;
         if (!world_->state(m.body).asleep) ++out.awake;
     }

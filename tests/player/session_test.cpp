@@ -183,6 +183,124 @@ TEST_F(SessionOnAPillar, ABallThatIsNoBallIsRefusedAndNothingStays) {
     run(2);
 }
 
+TEST_F(SessionOnAPillar, AStrokeAtABodyCutsItInThePlayAloneUntilItIsKept) {
+    Edit bar;
+    bar.node.shape = Box{.half_extents = {1, 0.2f, 0.2f}};
+    bar.node.transform.position = {4, 0.2f, 0};
+    ok(session_->launch(bar, {}));
+    run(10);
+    (void)session_->play().frame(Camera{});
+    const auto above = [&](float x) {
+        auto met = session_->play().pick({.origin = {x, 4, 0}, .direction = {0, -1, 0}});
+        EXPECT_TRUE(met && met->hit.hit);
+        return *met;
+    };
+    const PlayHit there = above(4);
+    EXPECT_EQ(there.body, "thrown1");
+    EXPECT_NEAR(there.hit.t, 3.6f, 0.02f);
+    EXPECT_EQ(above(8).body, "") << "the ground";
+    const uint64_t before = session_->world_hash();
+    session_->begin_stroke("dig");
+    ok(session_->dig(there.hit.position - vec3{0, 0.2f, 0}, 0.4f, false, there.body));
+    ok(session_->end_stroke());
+    EXPECT_EQ(session_->world_hash(), before) << "the ground is whole";
+    run(1);
+    EXPECT_EQ(session_->counts().bodies, 2) << "it was cut in two";
+    (void)session_->play().frame(Camera{});
+    EXPECT_NEAR(above(4).hit.t, 4, 0.02f) << "nothing is in between, and the ground is not dug";
+    EXPECT_NE(above(3.3f).body, above(4.7f).body);
+    // Kept: two bodies of the world.
+    ok(session_->keep());
+    EXPECT_TRUE(session_->world().find_edit("part1"));
+    EXPECT_TRUE(session_->world().find_edit("thrown1"));
+    ASSERT_TRUE(*session_->undo());
+    // Undone, the bar is whole again, where it was.
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->counts().bodies, 1);
+    EXPECT_EQ(session_->steps(), 11);
+    (void)session_->play().frame(Camera{});
+    EXPECT_NEAR(above(4).hit.t, 3.6f, 0.02f);
+    ASSERT_TRUE(*session_->redo());
+    run(1);
+    EXPECT_EQ(session_->counts().bodies, 2);
+    // The body that it cut never came: a stroke without an aim is none, and the play goes on.
+    ASSERT_TRUE(*session_->undo());
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(session_->counts().bodies, 0);
+}
+
+TEST_F(SessionOnAPillar, WhoeverWalksDoesSoAgainWhenThePlayIsRunAgain) {
+    EXPECT_FALSE(session_->walker());
+    session_->walk({1, 0, 0}, 3);  // nobody is there
+    ok(session_->enter({3, 0.01f, 0}));
+    run(2);
+    ASSERT_TRUE(session_->walker());
+    EXPECT_TRUE(session_->walker()->on_floor);
+    session_->walk({2, 5, 0}, 0);
+    run(30);
+    EXPECT_NEAR(session_->walker()->feet.x, 4, 0.01f);
+    EXPECT_NEAR(session_->walker()->feet.y, 0, 0.02f);
+    session_->walk({2, 0, 0}, 3);
+    run(10);
+    EXPECT_GT(session_->walker()->feet.y, 0.25f) << "it jumps";
+    session_->walk({0, 0, -1}, 0);
+    run(50);
+    EXPECT_TRUE(session_->walker()->on_floor);
+    // Dug away below, it falls.
+    session_->begin_stroke("dig");
+    ok(session_->dig(session_->walker()->feet, 0.8f, false));
+    ok(session_->end_stroke());
+    run(20);
+    EXPECT_LT(session_->walker()->feet.y, -0.3f);
+    // A throw that is undone runs all of it again.
+    Edit ball;
+    ball.node.shape = Sphere{.radius = 0.2f};
+    ball.node.transform.position = {30, 3, 0};
+    ok(session_->launch(ball, {}));
+    run(3);
+    ok(session_->advance(0, 1e9));
+    const vec3 feet = session_->walker()->feet;
+    ASSERT_TRUE(*session_->undo());
+    session_->walk({9, 0, 0}, 0);  // not while it is run again
+    ok(session_->advance(0, 1e9));
+    ASSERT_TRUE(session_->walker());
+    EXPECT_EQ(session_->walker()->feet, feet) << "bit for bit";
+    ok(session_->restart());
+    ASSERT_TRUE(session_->walker());
+    EXPECT_NEAR(session_->walker()->feet.x, feet.x, 1e-6f) << "where it was";
+    ok(session_->leave());
+    EXPECT_FALSE(session_->walker());
+    run(1);
+}
+
+// What a throw or an undo makes of the picture's field is what differs, not all of it.
+TEST_F(SessionOnAPillar, AThrowAndItsUndoKeepTheField) {
+    const auto bricks = [&] {
+        auto frame = session_->play().frame(Camera{});
+        EXPECT_TRUE(frame) << (frame ? "" : frame.error().message);
+        return frame->field;
+    };
+    const auto first = bricks();
+    Edit ball;
+    ball.node.shape = Sphere{.radius = 0.2f};
+    ball.node.transform.position = {60, 40, 0};  // far beyond what the field covers
+    ok(session_->launch(ball, {1, 0, 0}));
+    run(5);
+    EXPECT_EQ(bricks(), first);
+    stroke();
+    run(5);
+    const auto dug = bricks();
+    EXPECT_NE(dug, first);
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    const auto undone = bricks();
+    ASSERT_TRUE(*session_->undo());
+    ok(session_->advance(0, 1e9));
+    EXPECT_EQ(bricks(), undone) << "run again without the ball, the field is what it was";
+}
+
 TEST_F(SessionOnAPillar, KeepMakesTheWorldWhatThePlayIsAndUndoGoesBackToTheDigs) {
     run(2);
     stroke();

@@ -3,9 +3,12 @@
 #include "player/virtual_display.h"
 #include "temp_folder.h"
 
+#include <kiln/math.h>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -187,6 +190,45 @@ TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
     ASSERT_GT(png.size(), 24u);
     EXPECT_EQ(uint8_t(png[19]), 48);  // width and height of the header
     EXPECT_EQ(uint8_t(png[23]), 20);
+}
+
+TEST_F(View, GpuWalksJumpsLooksAndDigsWhereTheCrossIs) {
+    write("walk.jsonl", R"({"frame": 0, "mouse": [1, 1]}
+{"frame": 1, "key": "f", "down": true}
+{"frame": 2, "key": "w", "down": true}
+{"frame": 22, "key": "space", "down": true}
+{"frame": 32, "key": "w", "down": false}
+{"frame": 33, "button": "left", "down": true}
+{"frame": 34, "button": "left", "down": false}
+{"frame": 36, "key": "h", "down": true}
+{"frame": 37, "key": "escape", "down": true}
+{"frame": 38, "look": [100, 0]}
+{"frame": 39, "key": "escape", "down": true}
+{"frame": 41, "key": "escape", "down": true}
+)");
+    const Outcome o = run("view pillar.kiln.json --size 64x36 --frames 99 --keys walk.jsonl --ui-json a.jsonl");
+    ASSERT_EQ(o.code, 0) << o.err;
+    const auto feet = [&](int frame) {
+        std::istringstream in(read("a.jsonl"));
+        std::string line;
+        for (int i = 0; i <= frame; ++i) std::getline(in, line);
+        vec3 out{-99, -99, -99};
+        if (const size_t at = line.find("\"walker\": ["); at != std::string::npos)
+            (void)std::sscanf(line.c_str() + at, "\"walker\": [%f, %f, %f]", &out.x, &out.y, &out.z);
+        return out;
+    };
+    EXPECT_EQ(value("a.jsonl", 0, "walker"), "null");
+    EXPECT_NEAR(feet(2).y, 0, 0.03f) << "on the ground below the camera";
+    EXPECT_NEAR(feet(20).z, 6 - 18 * 3 / 60.0f, 0.11f);
+    EXPECT_GT(feet(30).y, 0.3f) << "it jumps";
+    EXPECT_NEAR(feet(35).z, 6 - 30 * 3 / 60.0f, 0.11f);
+    EXPECT_THAT(value("a.jsonl", 20, "widgets") + read("a.jsonl"), HasSubstr("\"aim\": ["));
+    EXPECT_EQ(value("a.jsonl", 33, "undo_depth"), "0");
+    EXPECT_EQ(value("a.jsonl", 35, "undo_depth"), "1") << "the cross is on the pillar, the mouse on the sky";
+    EXPECT_NE(value("a.jsonl", 35, "world"), value("a.jsonl", 32, "world"));
+    EXPECT_NE(feet(38).y, -99) << "Escape closed the keys";
+    EXPECT_EQ(value("a.jsonl", 40, "walker"), "null") << "then it flies";
+    EXPECT_THAT(value("a.jsonl", 43, "frame"), HasSubstr("no frame")) << "then it ends";
 }
 
 TEST_F(View, GpuAWindowShowsThePicturesOfAReplayWithoutOne) {

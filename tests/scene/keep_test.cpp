@@ -88,8 +88,8 @@ TEST_P(Keep, WhatIsKeptGoesOnAsIfNothingHadBeen) {
     const auto going = made(start);
     ASSERT_TRUE(going);
     step(*going, 20);
-    ASSERT_TRUE(going->launch({.node = {.shape = Sphere{.radius = 0.2f}, .transform = {.position = {0, 9, 12}}}},
-                              {2, 3, 0}));
+    ASSERT_TRUE(
+        going->launch({.node = {.shape = Sphere{.radius = 0.2f}, .transform = {.position = {0, 9, 12}}}}, {2, 3, 0}));
     ASSERT_TRUE(going->command_now(kSlit, "a slit"));
     step(*going, 10);
     const auto kept = going->keep(world);
@@ -102,7 +102,8 @@ TEST_P(Keep, WhatIsKeptGoesOnAsIfNothingHadBeen) {
         ASSERT_TRUE(again) << again.error().message;
         EXPECT_EQ(again->to_json(), text);
     }
-    EXPECT_THAT(text, HasSubstr("\"id\": \"b\",\n      \"density\": 500,\n      \"edits\": [\"ball\"]")) << "keys stay where they stood";
+    EXPECT_THAT(text, HasSubstr("\"id\": \"b\",\n      \"density\": 500,\n      \"edits\": [\"ball\"]"))
+        << "keys stay where they stood";
     ASSERT_TRUE(*world.history().undo());
     EXPECT_EQ(world.to_json(), begun);
     ASSERT_TRUE(*world.history().redo());
