@@ -116,6 +116,7 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
         return usage("--transparent-layers " + std::to_string(*o.transparent_layers) + ": it is 0 to 16");
     if (o.transparent_layers) s.transparent_layers = *o.transparent_layers;
     s.outline_hulls = o.outline_hulls;
+    s.outline_hidden = o.outline_hidden;
     s.cull_meshes = !o.no_cull;
     s.taa = o.taa;
     s.analytic = o.analytic;
@@ -220,7 +221,9 @@ std::string report(const PictureOptions& o, std::string_view quality, const Rend
         .raw("pass_bytes", named_numbers(stats.pass_bytes))
         .raw("pass_evaluations", named_numbers(stats.pass_evaluations))
         .number("transient_peak_bytes", double(stats.transient_peak_bytes))
-        .number("transient_sum_bytes", double(stats.transient_sum_bytes));
+        .number("transient_sum_bytes", double(stats.transient_sum_bytes))
+        .number("transient_pass_bytes", double(stats.transient_pass_bytes))
+        .number("side_by_side_ms", stats.side_by_side_ms);
     json.number("evaluations", double(stats.evaluations)).number("atlas_bytes", double(stats.atlas_bytes));
     json.number("host_bytes", double(stats.host_bytes)).number("pipelines_created", double(stats.pipelines_created));
     json.number("exposure", double(stats.exposure))

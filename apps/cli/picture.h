@@ -19,7 +19,7 @@ struct PictureOptions {
     uint32_t budget = 0;  ///< bricks a frame of a sequence, 0: no limit
     int reference = 0;
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
-         atlas_by_copy = false, no_cull = false, outline_hulls = false;
+         atlas_by_copy = false, no_cull = false, outline_hulls = false, outline_hidden = false;
     std::optional<int> transparent_layers;  ///< left out: as the quality says
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high

@@ -42,6 +42,8 @@ void add_render(CLI::App& app, Run& run) {
                    "draw meshes that something hides, and march on behind meshes: the same picture");
     verb->add_flag("--outline-hulls", o->outline_hulls,
                    "outline meshes by their back faces made larger, for comparison");
+    verb->add_flag("--outline-hidden", o->outline_hidden,
+                   "outlined things have their line also where something hides them");
     verb->add_option("--transparent-layers", o->transparent_layers,
                      "things of glass that one ray may go through, 0 to 16 (default 4, or as the quality says)");
     verb->add_flag("--no-refine", o->no_refine, "leave hits where the bricks have them, not where the edits do");

@@ -186,7 +186,8 @@ struct RenderSettings {
     int glass_bounces =
         4;  ///< times that glass may throw light back inside, [0, 16]; 0: and its mirror shows no other glass
     AmbientOcclusion ao = AmbientOcclusion::Full;
-    bool shown_alone = false;  ///< of a shaded picture only `srgb` is brought from the device, for whoever shows it
+    bool shown_alone = false;     ///< of a shaded picture only `srgb` is brought from the device, for whoever shows it
+    bool outline_hidden = false;  ///< outlined things have their line also where something hides them
 };
 
 /// What a picture may cost. Low: hard shadows, of meshes by maps; two things of glass behind one another, which throw no light back inside; surfaces as the
@@ -257,6 +258,8 @@ struct RenderStats {
     std::string lighting = "clusters";   ///< of point and spot lights: "clusters", "volumes"
     uint64_t instance_tiles_by_tree =
         0;  ///< of 8 x 8 pixels that met too many instances for a list, so that each ray walked their tree
+    uint64_t transient_pass_bytes = 0;  ///< of transient_peak_bytes, what one pass needs alone: no order has less
+    double side_by_side_ms = 0;  ///< of frame_ms, what is left where passes that do not wait for each other run at once
 };
 
 struct DeviceInfo {

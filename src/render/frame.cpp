@@ -165,15 +165,17 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
     resolve_instances(g, in, words, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (in.ao_every > 0) out.evaluations.push_back(g.readback(occlude(g, in, surface)));
+    Image depth;
     if (wanted == View::Shaded) {
         Image radiance = light(g, in, surface.seen, surface);
         Front front = draw_through(g, in, surface, radiance);
-        Image moved = in.taa ? motion(g, in, front.surface.seen) : radiance;  // not read without
-        draw_particles(g, in, surface.depth, front, radiance, moved);
-        if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.surface.depth, moved);
+        Image moved = in.taa ? motion(g, in, front.seen) : radiance;  // not read without
+        depth = in.through.empty() ? front.depth : depth_of(g, in, surface.seen);
+        draw_particles(g, in, depth, front, radiance, moved);
+        if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.depth, moved);
         if (in.upscales) {
-            radiance = taa_up(g, in, radiance, front.surface.depth, moved);
-            surface.depth = upscale_depth(g, in, surface.depth);
+            radiance = taa_up(g, in, radiance, front.depth, moved);
+            depth = upscale_depth(g, in, depth);
         }
         out.radiance = g.readback(radiance);
         if (in.develops) {
@@ -181,18 +183,19 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
             if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
             const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
             Image shown = tonemap(g, radiance, glow, exposure, in.camera);
-            if (in.outline_hulls) shown = draw_hulls(g, in, surface, shown);
+            if (in.outline_hulls) shown = draw_hulls(g, in, surface.seen, depth, shown);
             if (in.outline_count > 0 || in.outlines_meshes) shown = outline(g, in, surface.seen, shown);
-            shown = draw_lines(g, in, surface.depth, shown);
+            shown = draw_lines(g, in, depth, shown);
             out.shown = g.readback(shown);
             out.exposure = g.readback(exposure);
         }
     } else {
-        const Shown shown = view(g, in, words, surface);
+        depth = depth_of(g, in, surface.seen);
+        const Shown shown = view(g, in, words, surface, depth);
         out.radiance = g.readback(shown.values);
         out.shown = g.readback(shown.bytes);
     }
-    out.depth = g.readback(surface.depth);
+    out.depth = g.readback(depth);
     return out;
 }
 
@@ -253,7 +256,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (!in.analytic && (!in.rt || in.has_blends)) out.push_back(&march_kernel(in));
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
-    out.push_back(&resolve_kernel(in));
+    out.insert(out.end(), {&resolve_kernel(in), &kDepthOf});
     instance_kernels(in, view == View::Shaded, out);
     if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
     if (in.cull_meshes) out.insert(out.end(), {&kDepthPyramid, &kDepthPyramidRest, &kMeshCull, &kMeshPack, &kMeshPick});
@@ -284,6 +287,8 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (in.outline_count > 0) out.push_back(&specialised(kOutlineMask, in.use_of_outlines));
     if (in.outline_count > 0 || in.outlines_meshes) out.insert(out.end(), {&kOutlineFlood, &kOutlineDraw});
     if (in.outlines_meshes || in.outline_hulls) out.push_back(&kOutlineMeshes);
+    if (in.outline_hidden && in.outline_count > 0) out.push_back(&specialised(kOutlineHidden, in.use_of_outlines));
+    if (in.outline_hidden && in.outlines_meshes) out.push_back(&kOutlineHiddenMeshes);
     if (in.upscales && (in.outline_count > 0 || in.outlines_meshes)) out.push_back(&kUpOwners);
     if (in.has_lines || in.outline_hulls) out.push_back(&kLinesOver);
     return out;
@@ -295,6 +300,7 @@ std::vector<const RasterKernel*> frame_raster_kernels(const TileInputs& in) {
     if (in.has_meshes && !in.mesh_shader) out = {&kMeshOneSided, &kMeshDoubleSidedDraw, &kMeshMasked};
     if (in.has_lines) out.push_back(&kLines);
     if (in.outline_hulls) out.push_back(&kOutlineHull);
+    if (in.outline_hidden && in.outlines_meshes && in.mesh_shader) out.push_back(&kMeshDoubleSidedDraw);
     if (in.volume_count > 0) out.push_back(&light_volume_kernel(in));
     if (in.has_cascades) out.push_back(&kCascade);
     if (in.has_cascades && in.mesh_holes) out.push_back(&kCascadeMask);

@@ -51,9 +51,13 @@ int read_class(const GraphResource& r, Access access) {
     return r.is_image && rhi::is_depth(r.format) && rhi::any(access & Access::CopyRead) ? 1 : 0;
 }
 
+}  // namespace
+
 bool together(const GraphResource& r, Access a, Access b) {
     return !rhi::writes(a) && !rhi::writes(b) && read_class(r, a) == read_class(r, b);
 }
+
+namespace {
 
 Access entry_access(const GraphResource& r, size_t cell) { return r.entry.empty() ? Access::Undefined : r.entry[cell]; }
 

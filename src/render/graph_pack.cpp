@@ -3,6 +3,7 @@
 #include "render/graph_compile.h"
 
 #include <algorithm>
+#include <numeric>
 #include <tuple>
 
 namespace kiln::render {
@@ -31,6 +32,16 @@ void pack(Plan& plan) {
     for (size_t i = 0; i < order.size(); ++i) order[i] = i;
     std::stable_sort(order.begin(), order.end(),
                      [&](size_t a, size_t b) { return plan.placements[a].size > plan.placements[b].size; });
+    std::vector<uint64_t> need(plan.resources.size(), 0);
+    for (const Placement& p : plan.placements) need[p.resource] = p.size;
+    for (const GraphPass& pass : plan.passes) {
+        std::vector<uint32_t> touched;
+        for (const GraphAccess& a : pass.accesses) touched.push_back(a.resource);
+        std::ranges::sort(touched);
+        const auto last = std::ranges::unique(touched).begin();
+        const auto sum = [&](uint64_t before, uint32_t resource) { return before + need[resource]; };
+        plan.most_of_a_pass = std::max(plan.most_of_a_pass, std::accumulate(touched.begin(), last, uint64_t{0}, sum));
+    }
     std::vector<Placement*> placed;  // by offset
     for (const size_t i : order) {
         Placement& p = plan.placements[i];

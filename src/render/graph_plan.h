@@ -66,6 +66,7 @@ struct Plan {
     std::vector<Placement> placements = {};  // by resource
     uint64_t peak_bytes = 0;                 // size of the shared memory
     uint64_t unaliased_bytes = 0;            // what the transients would need one beside the other
+    uint64_t most_of_a_pass = 0;  // what the transients of one pass need: no order and no packing has a lower peak
     bool aliasing = true;
     std::vector<MemoryTail> tail_before = {};  // CompileOptions::tail
     std::vector<MemoryTail> tail = {};         // for the next frame's CompileOptions

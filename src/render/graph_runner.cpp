@@ -3,6 +3,7 @@
 
 #include "base/assert.h"
 #include "render/graph_objects.h"
+#include "render/graph_queues.h"
 #include "render/graph_readback.h"
 
 #include <algorithm>
@@ -67,6 +68,7 @@ struct Runner::Impl {
         std::vector<uint64_t> bytes = {};  // of each pass
         uint32_t capacity = 0;             // passes
         std::vector<std::string> names = {};
+        std::vector<std::vector<uint32_t>> dependencies = {};  // of each pass
         bool collected = true;
         FrameTimes times = {};
     };
@@ -207,6 +209,9 @@ Result<void> Runner::Impl::collect(Slot& slot) {
         done = std::max(done, end);
     }
     slot.times.total_ms = double(done - ticks[0]) * ms_per_tick;
+    std::vector<double> lasts;
+    for (const PassTime& pass : slot.times.passes) lasts.push_back(pass.ms);
+    slot.times.side_by_side_ms = critical_path(slot.dependencies, lasts);
     if (slot.submit > newest.submit) newest = slot.times;
     return {};
 }
@@ -565,6 +570,7 @@ Result<rhi::SubmitId> Runner::Impl::submit(const Graph& graph, Slot& slot) {
     auto encoder = device.create_encoder("frame");
     slot.names.clear();
     slot.bytes.clear();
+    slot.dependencies = dependencies(plan);
     const rhi::Barrier free{.buffer = slot.ticks, .before = Access::HostRead, .after = Access::CopyWrite};
     if (slot.queries && !plan.passes.empty()) {
         encoder->write_timestamp(slot.queries, 0);

@@ -24,6 +24,7 @@ struct FrameTimes {
     rhi::SubmitId submit = 0;
     std::vector<PassTime> passes = {};  // in order of execution
     double total_ms = 0;                // first start to last end
+    double side_by_side_ms = 0;         // critical_path()
 };
 
 struct RunnerStats {

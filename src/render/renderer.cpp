@@ -1,10 +1,25 @@
 // SPDX-License-Identifier: MIT
 #include "render/renderer_impl.h"
 
+#include "base/assert.h"
+#include "base/format.h"
+#include "base/log.h"
+#include "field/field.h"
+#include "render/frame.h"
+#include "render/lib/ggx_table.h"
+#include "render/lib/pack.h"
+#include "render/merged.h"
+#include "render/passes/forward.h"
+#include "render/passes/refine.gpu.h"
+#include "render/picture.h"
+#include "render/temporal.h"
+
 #include <algorithm>
 #include <chrono>
 
 namespace kiln {
+
+using namespace render;
 
 Result<void> Renderer::Impl::prepare() {
     device->set_error_sink([this](std::string_view sentence) {
@@ -46,6 +61,7 @@ Result<void> Renderer::Impl::bring(const Frame& frame) {
 
 void Renderer::Impl::add_times(const FrameTimes& times) {
     stats.frame_ms += times.total_ms;
+    stats.side_by_side_ms += times.side_by_side_ms;
     for (const PassTime& pass : times.passes) {
         const std::string name = pass.name.substr(0, pass.name.find(" ["));  // without what a kernel is specialised for
         const auto same =

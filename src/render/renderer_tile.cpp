@@ -2,10 +2,23 @@
 // One tile of a picture, from what it needs of the frame to what is read back.
 #include "render/renderer_impl.h"
 
+#include "render/frame.h"
+#include "render/lib/pack.h"
+#include "render/light_rects.h"
+#include "render/passes/cascades.h"
+#include "render/passes/instances.h"
+#include "render/passes/lamps.h"
+#include "render/picture.h"
+#include "render/shadow_cascades.h"
+#include "render/temporal.h"
+#include "render/through_rects.h"
+
 #include <algorithm>
 #include <chrono>
 
 namespace kiln {
+
+using namespace render;
 
 void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const {
     if (!in.has_glass && !in.has_blends) return;
@@ -227,6 +240,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         }
         stats.transient_peak_bytes = std::max(stats.transient_peak_bytes, runner->stats().peak_bytes);
         stats.transient_sum_bytes = std::max(stats.transient_sum_bytes, runner->stats().unaliased_bytes);
+        stats.transient_pass_bytes = std::max(stats.transient_pass_bytes, runner->plan().most_of_a_pass);
         if (!device->caps().timestamp) return {};
         auto times = runner->times(*submit);
         if (!times) return times.error();
@@ -252,7 +266,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         refined = refine_on_host(field->code_of_bricks(), params, visibility);
         refine_instances_on_host(*instances, params, visibility, refined);
         const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-        add_times({.passes = {{.name = "refine", .ms = ms}}, .total_ms = ms});
+        add_times({.passes = {{.name = "refine", .ms = ms}}, .total_ms = ms, .side_by_side_ms = ms});
     }
     Graph g(*runner);
     const TileInputs in = inputs_on(g);

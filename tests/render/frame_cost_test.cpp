@@ -59,6 +59,25 @@ TEST_F(FrameCostGpu, EveryPassTellsItsBytesAndTransientsShareTheirMemory) {
     EXPECT_LE(double(s.transient_peak_bytes), 0.6 * double(s.transient_sum_bytes));
 }
 
+// Six tenths of the sum, or a tenth more than what one pass reads and writes: of a frame of few passes that is more, and no order and no packing
+// can go below it. (The tenth: passes that do not wait for each other run side by side.)
+TEST_F(FrameCostGpu, NoFrameHoldsMoreThanItsHeaviestPassNeedsOrSixTenthsOfAll) {
+    Frame bare = scene();
+    bare.meshes.clear();
+    bare.camera.bloom = 0;
+    for (const Frame& frame : {bare, scene()}) {
+        for (const Quality q : {Quality::Low, Quality::Medium, Quality::High, Quality::Ultra}) {
+            RenderSettings settings{.width = 64, .height = 48};
+            set_quality(settings, q);
+            (void)rhi::must(renderer->render(frame, settings));
+            const RenderStats& s = renderer->stats();
+            EXPECT_LE(double(s.transient_peak_bytes),
+                      std::max(0.6 * double(s.transient_sum_bytes), 1.1 * double(s.transient_pass_bytes)))
+                << int(q) << ", meshes " << frame.meshes.size();
+        }
+    }
+}
+
 TEST_F(FrameCostGpu, QualitiesChangeWhatTheySay) {
     const Frame frame = scene();
     const auto drawn = [&](Quality q) {

@@ -26,6 +26,7 @@ struct GatesGpu : testing::Test {
     }
     std::unique_ptr<Renderer> renderer;
 };
+struct GatesSlowGpu : GatesGpu {};
 
 // The image of everything far away that shines so in every direction.
 std::shared_ptr<const EnvironmentMap> map_of(int width, vec3 (*color)(vec3)) {
@@ -145,6 +146,54 @@ TEST(Gates, AnImageOfTheSkyHasNoSeam) {
         }
     }
     EXPECT_LE(worst, 1.0f / 255);
+}
+
+// Gates G24 and G25 of a frame with everything in it: two renderers draw the same bits, and no picture but the first makes a pipeline.
+TEST_F(GatesSlowGpu, AFrameOfEverythingIsTheSameInTwoRunsAndMakesNoPipelineLate) {
+    Frame frame = frame_of(on_ground());
+    frame.materials[1].opacity = 0.2f;
+    auto set = rhi::must(field::BrickSet::make(field::worlds::compiled({field::worlds::edit(Sphere{0.4f})}), 0.05f));
+    const Pose at{{0, 1, 0.5f}, {}}, beside{{-0.9f, 0.4f, 0.8f}, {}};
+    frame.instances = {Instance{.bricks = set, .pose = at, .before = at, .material = 1, .glass = 1},
+                       Instance{.bricks = set, .pose = beside, .before = beside, .material = 2}};
+    model::Surface s = meshes::matte({1, 0.5f, 0.2f}, 1);
+    s.base_color.w = 0.5f;
+    s.blend = s.double_sided = true;
+    frame.meshes = {meshes::at(meshes::sheet(-0.8f, -0.8f, 0.8f, 0.8f, s), {0, 0.6f, 0}),
+                    meshes::at(meshes::sphere(0.3f, 16, meshes::matte({0.2f, 0.8f, 0.3f})), {0.8f, 0.3f, 0.9f})};
+    frame.meshes[1].outline = Outline{.color = {1, 0, 0}, .width_px = 2};
+    frame.outlines = {{frame.field->program().rows()[1], Outline{.color = {0, 1, 0}, .width_px = 2}}};
+    frame.particles = {Particle{.position = {0.2f, 0.5f, 0.4f},
+                                .before = {},
+                                .radius = 0.3f,
+                                .color = {1, 1, 1},
+                                .opacity = 0.6f,
+                                .emissive = {}}};
+    frame.lines = {DebugLine{{-1, 0, 0}, {1, 1, 0}}};
+    frame.lights.push_back({.kind = Light::Kind::Point, .position = {1, 2, 1}, .intensity = 3, .radius = 0.1f});
+    frame.camera.bloom = 0.1f;
+    frame.camera.auto_exposure = true;
+    auto other = renderer_or_skip();
+    ASSERT_TRUE(other);
+    for (const MeshShadows shadows : {MeshShadows::Rays, MeshShadows::Cascades}) {
+        RenderSettings settings{.width = 40, .height = 30, .taa = true, .elapsed = 0.02f, .mesh_shadows = shadows};
+        uint64_t made = 0;
+        for (int i = 0; i < 3; ++i) {
+            frame.camera.position.x += 0.01f;
+            frame.instances[1].before = frame.instances[1].pose;
+            frame.instances[1].pose.position.y += 0.02f;
+            const Picture a = picture(frame, settings), b = rhi::must(other->render(frame, settings));
+            EXPECT_EQ(a.rgba, b.rgba) << i;
+            EXPECT_EQ(a.srgb, b.srgb) << i;
+            EXPECT_EQ(a.depth, b.depth) << i;
+            EXPECT_TRUE(i == 0 || renderer->stats().pipelines_created == made) << i;
+            made = renderer->stats().pipelines_created;
+        }
+    }
+    // Where there is much to share, it is shared.
+    const RenderStats& stats = renderer->stats();
+    EXPECT_LE(double(stats.transient_peak_bytes), 0.6 * double(stats.transient_sum_bytes));
+    EXPECT_LE(stats.transient_pass_bytes, stats.transient_peak_bytes);
 }
 
 // Gate: what is behind glass, panes, particles and lines needs no copy of depth: the frame copies nothing but what leaves it or comes in.

@@ -9,6 +9,7 @@
 #include "render/gpu_instances.h"
 #include "render/lib/octahedral.gpu.h"
 #include "render/lib/pack.h"
+#include "render/passes/forward.h"
 #include "render/passes/instances.h"
 #include "render/passes/refine.gpu.h"
 #include "render/picture.h"
@@ -362,6 +363,86 @@ TEST_F(InstancesGpu, RefinedPointsAreTheSameOnHostAndDevice) {
     EXPECT_GE(moved, found * 97 / 100);
     EXPECT_LE(apart, found / 100);
     EXPECT_EQ(off, 0);
+}
+
+// Rays that start inside glass meet its surface from inside, where the distance grows along them: on the device, whatever it would do in a frame.
+TEST_F(InstancesGpu, RaysInsideGlassAreRefinedToWhereTheyLeaveIt) {
+    const float radius = 0.4f;
+    Frame frame = frame_of(field::worlds::sphere_of(10));
+    frame.materials[1].opacity = 0.1f;
+    Instance ball;
+    ball.bricks = rhi::must(
+        field::BrickSet::make(field::worlds::compiled({field::worlds::edit(Sphere{.radius = radius})}), 0.05f));
+    ball.pose = ball.before = {{1.6f, 0.7f, 0.3f}, axis_angle(normalize(vec3{1, 2, 0.5f}), 0.8f)};
+    ball.material = ball.glass = 1;
+    frame.instances = {ball};
+    GpuField gpu(*runner_);
+    GpuInstances instances(*runner_, gpu);
+    instances.reserve(frame.instances);
+    rhi::must(gpu.update(frame.field, Baker::Host));
+    rhi::must(instances.update(frame.instances));
+    FrameParams p = rhi::must(frame_params(frame, {.width = 24, .height = 16}, gpu));
+    p.flags |= kFrameRays;
+    instances.place(frame.instances, p, frame.materials);
+    field::worlds::Random random(3);
+    std::vector<FrameRay> rays;
+    std::vector<vec3> from, to;
+    const float h = p.grid.voxel_size;
+    for (int i = 0; i < p.width * p.height; ++i) {
+        const vec3 at = ball.pose.position + random.direction() * (radius * random.in(0, 0.9f)), d = random.direction();
+        FrameRay r{};
+        r.within = 1;
+        r.whole_x = int(std::floor(at.x / h)), r.part_x = at.x / h - float(r.whole_x);
+        r.whole_y = int(std::floor(at.y / h)), r.part_y = at.y / h - float(r.whole_y);
+        r.whole_z = int(std::floor(at.z / h)), r.part_z = at.z / h - float(r.whole_z);
+        r.direction_x = d.x, r.direction_y = d.y, r.direction_z = d.z;
+        rays.push_back(r);
+        from.push_back(at - ball.pose.position);
+        to.push_back(d);
+    }
+    Graph g(*runner_);
+    TileInputs in;
+    in.field = gpu.import(g);
+    in.instances = instances.import(g).of_glass();
+    in.frame = g.block(p);
+    in.rays = g.upload("rays", std::span<const FrameRay>(rays));
+    in.size = {uint32_t(p.width), uint32_t(p.height)};
+    // Nothing solid: the words of rays that met nothing.
+    std::vector<uint32_t> nothing;
+    for (size_t i = 0; i < rays.size(); ++i)
+        nothing.insert(nothing.end(), {std::bit_cast<uint32_t>(field::kFarVoxels), kSeenNothing << 28, 0u, 0u});
+    Image solid = g.create("solid", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    std::vector<uint32_t> rows(size_t(p.height) * 128);  // rows of whole 256 bytes
+    for (size_t i = 0; i < nothing.size(); ++i) rows[i / 96 * 128 + i % 96] = nothing[i];
+    const CopyRegion all{.bytes_per_row = 512, .rows_per_layer = in.size.height, .size = in.size};
+    g.copy(g.upload("solid", std::span<const uint32_t>(rows)), solid, std::span(&all, 1));
+    const Image seen = march_glass(g, in, solid);
+    Image refined = g.create("refined", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    refine_instances(g, in, seen, refined);
+    const Readback words = g.readback(seen), kernel = g.readback(refined);
+    rhi::must(runner_->execute(g));
+    const auto visible = rhi::must(words.get_as<uint32_t>()), by_kernel = rhi::must(kernel.get_as<uint32_t>());
+    double worst_before = 0, worst = 0;
+    int refused = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        ASSERT_EQ(visible[4 * i + 1] >> 28, kSeenInstance) << i;
+        if (by_kernel[4 * i] == kNotRefined) {
+            ++refused;
+            continue;
+        }
+        const double b = double(dot(from[i], to[i])), c = double(dot(from[i], from[i])) - double(radius * radius);
+        const double exact = std::sqrt(b * b - c) - b;
+        const auto off = [&](uint32_t word) {
+            return std::fabs(double(std::bit_cast<float>(word)) * double(h) - exact);
+        };
+        worst_before = std::max(worst_before, off(visible[4 * i]));
+        worst = std::max(worst, off(by_kernel[4 * i]));
+        const vec3 n = (from[i] + to[i] * float(exact)) * (1 / radius);
+        EXPECT_GT(dot(shade::unpack_unit(by_kernel[4 * i + 1]), n), 0.9999f) << "outwards, whoever looks";
+    }
+    EXPECT_LE(refused, int(rays.size() / 100));
+    EXPECT_GT(worst_before, 1e-4) << "bricks alone must be worse";
+    EXPECT_LT(worst, 2e-5);
 }
 
 TEST_F(InstancesGpu, AMaterialFillsInWhereTheObjectHasNone) {

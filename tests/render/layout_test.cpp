@@ -82,7 +82,7 @@ TEST(Layout, LevelsAreTheSame) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 12; ++i) words.push_back(i * 4);
     for (const auto& [kernel, number] :
-         {std::pair{&kMarchLevels, 8u}, {&kMarchLevelsInstances, 8u}, {&kResolveLevels, 13u}, {&kShadowLevels, 10u}}) {
+         {std::pair{&kMarchLevels, 8u}, {&kMarchLevelsInstances, 8u}, {&kResolveLevels, 12u}, {&kShadowLevels, 10u}}) {
         const rhi::Reflection r = reflected(*kernel);
         const rhi::ReflectedBinding* b = binding(r, number);
         ASSERT_TRUE(b) << kernel->name;

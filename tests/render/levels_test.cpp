@@ -5,7 +5,11 @@
 
 #include "field/clipmap.h"
 #include "image/metrics.h"
+#include "render/lib/pack.h"
+#include "render/lib/shading.gpu.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -188,6 +192,67 @@ TEST(LevelPicturesGpu, DrawWhatOneLevelDraws) {
     }
     EXPECT_EQ(renderer->stats().levels.size(), 5u);
     EXPECT_FALSE(renderer->render(levels, {.width = 16, .height = 16, .analytic = true}));
+}
+
+// Rays for shadows start a voxel of their level off the surface: no stripes on a plane that crosses voxels, bricks and levels at a slant, wherever
+// the sun is. It is a slab's top: nothing else is there to shade it.
+TEST(LevelPicturesGpu, APlaneAcrossLevelsDoesNotShadeItself) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP();
+    Edit slab = field::worlds::edit(Box{.half_extents = {30, 1, 30}}, {0, -1, 0});
+    slab.node.transform.rotation = axis_angle(normalize(vec3{1, 0, 0.4f}), 0.037f);
+    const vec3 up = rotate(slab.node.transform.rotation, {0, 1, 0});
+    const vec3 top = slab.node.transform.position + up;
+    const vec3 eye{0.1f, 0.5f, 0.2f};
+    Clipmap map = made(field::worlds::compiled({slab}), {0.1, 0.5, 0.2}, 0.02f, 5);
+    map.work();
+    Frame frame = seen_from(map, eye, {0.5f, 0.2f, -1});
+    frame.materials.assign(8, Material{.base_color = {0.8f, 0.8f, 0.8f}, .roughness = 1});
+    frame.environment = Environment{.color = {0, 0, 0}};
+    const vec3 across = normalize(cross(up, vec3{0.3f, 0, 1})), along = cross(across, up);
+    for (const bool refine : {true, false}) {
+        const RenderSettings settings{.width = 64, .height = 36, .refine = refine};
+        RenderSettings levels = settings;
+        levels.view = View::Levels;
+        const Picture colors = rhi::must(renderer->render(frame, levels));
+        std::vector<std::array<uint8_t, 3>> seen;
+        for (size_t i = 0; i < colors.depth.size(); ++i) {
+            const std::array<uint8_t, 3> c{colors.srgb[4 * i], colors.srgb[4 * i + 1], colors.srgb[4 * i + 2]};
+            if (std::isfinite(colors.depth[i]) && std::find(seen.begin(), seen.end(), c) == seen.end())
+                seen.push_back(c);
+        }
+        EXPECT_GE(seen.size(), 3u) << "levels";
+        for (const float degrees : {45.0f, 80.0f, 89.0f}) {
+            for (const float turn : {0.3f, 2.0f}) {
+                const float a = degrees * 0.017453293f;
+                const vec3 to_sun = up * std::cos(a) + (across * std::cos(turn) + along * std::sin(turn)) * std::sin(a);
+                frame.lights = {
+                    {.kind = Light::Kind::Directional, .direction = to_sun * -1.0f, .angular_diameter_deg = 0.53f}};
+                const Picture p = rhi::must(renderer->render(frame, settings));
+                const shade::LightRecord record = shade::light_record(frame.lights[0]);
+                const shade::CameraParams camera = shade::camera_params(frame.camera, p.width, p.height);
+                const shade::SurfaceOptics white = shade::surface_optics({0.8f, 0.8f, 0.8f}, 0, 1);
+                int judged = 0;
+                float least = 1;
+                for (int i = 0; i < p.width * p.height; ++i) {
+                    const float far = p.depth[size_t(i)];
+                    if (!std::isfinite(far)) continue;
+                    const vec3 d =
+                        shade::camera_direction_at(camera, float(i % p.width) + 0.5f, float(i / p.width) + 0.5f);
+                    const vec3 at = eye + d * far;
+                    if (std::fabs(dot(at - top, up)) > 0.01f || far > 12) continue;
+                    ++judged;
+                    const shade::LightSample light = shade::sample_light(record, at);
+                    const float open = shade::shade_light(shade::surface_view(white, up, d * -1.0f), light, 1).x;
+                    least = std::min(least, p.rgba[4 * size_t(i)] / open);
+                }
+                EXPECT_GT(judged, 600);
+                // At 89 degrees a hundredth of a degree of the normal that bricks have is a hundredth of the light.
+                EXPECT_GE(least, refine || degrees < 85 ? 0.99f : 0.98f)
+                    << degrees << " degrees, " << turn << ", refine " << refine;
+            }
+        }
+    }
 }
 
 // A camera that goes a centimetre a frame. Levels snap to new places under it and bake within a budget; what it sees is what a world

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Outlines: lines of constant width against the exact distance to what they surround, and whose a point is against both operands.
+#include "drawables.h"
 #include "gpu_worlds.h"
 #include "field/brick_set.h"
 #include "render/lib/color.gpu.h"
@@ -15,6 +16,7 @@ namespace {
 constexpr int kWidth = 96, kHeight = 80;
 
 struct OutlineGpu : GpuTest {
+    int width_ = kWidth, height_ = kHeight;  // of masks
     // Lines round `owner` (number + 1 of a record, 0 outside) as shares of pixels, drawn in red on black.
     std::vector<uint32_t> flooded_seeds;
     std::vector<float> covered(const std::vector<uint32_t>& owner, const std::vector<float>& widths) {
@@ -25,13 +27,16 @@ struct OutlineGpu : GpuTest {
             r.width_px = w;
         }
         std::vector<uint32_t> seeds(owner.size());
-        for (uint32_t i = 0; i < owner.size(); ++i) seeds[i] = owner[i] == 0 ? kNoSeed : i % kWidth | i / kWidth << 16;
+        for (uint32_t i = 0; i < owner.size(); ++i)
+            seeds[i] = owner[i] == 0 ? kNoSeed : i % uint32_t(width_) | i / uint32_t(width_) << 16;
+        const rhi::Extent size{uint32_t(width_), uint32_t(height_)};
         Graph g(*runner_);
         const auto image_of = [&](std::string_view name, const std::vector<uint32_t>& words) {
-            std::vector<uint32_t> rows(128 * size_t{kHeight});  // rows of whole 256 bytes
-            for (size_t i = 0; i < words.size(); ++i) rows[i / kWidth * 128 + i % kWidth] = words[i];
-            Image out = g.create(name, {.size = {kWidth, kHeight}, .format = rhi::Format::R32Uint});
-            const CopyRegion all{.bytes_per_row = 512, .rows_per_layer = kHeight, .size = {kWidth, kHeight}};
+            const size_t across = size_t(width_), row = (across + 63) / 64 * 64;  // rows of whole 256 bytes
+            std::vector<uint32_t> rows(row * size_t(height_));
+            for (size_t i = 0; i < words.size(); ++i) rows[i / across * row + i % across] = words[i];
+            Image out = g.create(name, {.size = size, .format = rhi::Format::R32Uint});
+            const CopyRegion all{.bytes_per_row = uint32_t(4 * row), .rows_per_layer = uint32_t(height_), .size = size};
             g.copy(g.upload(name, std::span<const uint32_t>(rows)), out, std::span(&all, 1));
             return out;
         };
@@ -40,12 +45,12 @@ struct OutlineGpu : GpuTest {
         mask.seeds = image_of("seeds", seeds);
         Buffer buffer = g.upload("outlines", std::span<const OutlineRecord>(records));
         const Image flooded = outline_flood(g, buffer, mask, *std::max_element(widths.begin(), widths.end()));
-        Image shown = g.create("shown", {.size = {kWidth, kHeight}, .format = rhi::Format::Rgba8Unorm});
+        Image shown = g.create("shown", {.size = size, .format = rhi::Format::Rgba8Unorm});
         g.clear(shown);
-        Image drawn = g.create("drawn", {.size = {kWidth, kHeight}, .format = rhi::Format::Rgba8Unorm});
+        Image drawn = g.create("drawn", {.size = size, .format = rhi::Format::Rgba8Unorm});
         g.dispatch(kOutlineDraw, shown.size,
                    {g.read(buffer), g.read(mask.owners), g.read(flooded), g.read(shown), g.write(drawn)},
-                   OutlinePush{kWidth, kHeight, 0, 0});
+                   OutlinePush{width_, height_, 0, 0});
         const Readback bytes = g.readback(drawn), ends = g.readback(flooded);
         rhi::must(runner_->execute(g));
         flooded_seeds = rhi::must(ends.get_as<uint32_t>());
@@ -55,15 +60,53 @@ struct OutlineGpu : GpuTest {
         return out;
     }
     template <typename Inside>
-    static std::vector<uint32_t> mask_of(Inside&& inside) {
+    std::vector<uint32_t> mask_of(Inside&& inside) const {
         std::vector<uint32_t> out;
-        for (int y = 0; y < kHeight; ++y)
-            for (int x = 0; x < kWidth; ++x) out.push_back(uint32_t(inside(double(x) + 0.5, double(y) + 0.5)));
+        for (int y = 0; y < height_; ++y)
+            for (int x = 0; x < width_; ++x) out.push_back(uint32_t(inside(double(x) + 0.5, double(y) + 0.5)));
         return out;
+    }
+    // Every pixel's line and seed against the exact distance: to all pixels of the rims, of which the nearest pixel is one.
+    void expect_exact(const std::vector<uint32_t>& owner, const std::vector<float>& widths) {
+        const std::vector<float> seen = covered(owner, widths);
+        std::vector<int> rim;
+        for (int i = 0; i < width_ * height_; ++i) {
+            const auto other = [&](int dx, int dy) {
+                const int x = i % width_ + dx, y = i / width_ + dy;
+                return x >= 0 && y >= 0 && x < width_ && y < height_ &&
+                       owner[size_t(y * width_ + x)] != owner[size_t(i)];
+            };
+            if (owner[size_t(i)] != 0 && (other(-1, 0) || other(1, 0) || other(0, -1) || other(0, 1))) rim.push_back(i);
+        }
+        int off = 0, line = 0;
+        for (int i = 0; i < width_ * height_; ++i) {
+            const auto past = [&](int j) {
+                return std::hypot(i % width_ - j % width_, i / width_ - j / width_) -
+                       double(widths[owner[size_t(j)] - 1]);
+            };
+            const bool outside = owner[size_t(i)] == 0;
+            double least = outside ? 1e9 : past(i);
+            for (const int j : rim) least = std::min(least, past(j));
+            // Nothing farther off is drawn, and what is drawn there may be half a pixel off where the mask has steps.
+            if (least > 1) {
+                EXPECT_EQ(seen[size_t(i)], 0) << i % width_ << ", " << i / width_;
+                continue;
+            }
+            if (outside && least < -1) {
+                EXPECT_EQ(seen[size_t(i)], 1) << i % width_ << ", " << i / width_;
+            }
+            ++line;
+            const uint32_t seed = flooded_seeds[size_t(i)];
+            ASSERT_NE(seed, kNoSeed) << i % width_ << ", " << i / width_;
+            const double found = past(int(seed >> 16) * width_ + int(seed & 0xffffu));
+            EXPECT_LE(found, least + 0.5) << i % width_ << ", " << i / width_;
+            off += found > least + 1e-4;
+        }
+        EXPECT_GT(line, 200);
+        EXPECT_LE(off, line / 500) << "of " << line;
     }
 };
 
-// Every pixel, by looking at every pixel inside.
 TEST_F(OutlineGpu, LinesEndWhereTheExactDistanceSays) {
     const auto star = [](double x, double y) {
         const double dx = x - 44, dy = y - 38;
@@ -75,37 +118,22 @@ TEST_F(OutlineGpu, LinesEndWhereTheExactDistanceSays) {
         if (std::fabs(x - 10.5) < 0.5 && std::fabs(y - 70.5) < 0.5) return 2;
         return star(x, y);
     };
-    for (const std::vector<float>& widths : {std::vector<float>{3, 5}, {1, 12}, {24, 2.5f}}) {
-        const std::vector<uint32_t> owner = mask_of(two);
-        const std::vector<float> seen = covered(owner, widths);
-        int off = 0, line = 0;
-        for (int i = 0; i < kWidth * kHeight; ++i) {
-            const auto past = [&](size_t j) {
-                const double far = std::hypot(i % kWidth - int(j) % kWidth, i / kWidth - int(j) / kWidth);
-                return far - double(widths[owner[j] - 1]);
-            };
-            double least = 1e9;
-            for (size_t j = 0; j < owner.size(); ++j)
-                if (owner[j] != 0) least = std::min(least, past(j));
-            const bool outside = owner[size_t(i)] == 0;
-            // Nothing farther off is drawn, and what is drawn there may be half a pixel off where the mask has steps.
-            if (least > 1) {
-                EXPECT_EQ(seen[size_t(i)], 0) << i % kWidth << ", " << i / kWidth;
-                continue;
-            }
-            if (outside && least < -1) {
-                EXPECT_EQ(seen[size_t(i)], 1) << i % kWidth << ", " << i / kWidth;
-            }
-            ++line;
-            const uint32_t seed = flooded_seeds[size_t(i)];
-            ASSERT_NE(seed, kNoSeed) << i % kWidth << ", " << i / kWidth;
-            const double found = past((seed >> 16) * kWidth + (seed & 0xffffu));
-            EXPECT_LE(found, least + 0.5) << i % kWidth << ", " << i / kWidth;
-            off += found > least + 1e-4;
-        }
-        EXPECT_GT(line, 200);
-        EXPECT_LE(off, line / 500) << "of " << line;
-    }
+    for (const std::vector<float>& widths : {std::vector<float>{3, 5}, {1, 12}, {24, 2.5f}})
+        expect_exact(mask_of(two), widths);
+}
+
+// Up to the widest that are asked for, round what is square, round, hollow and sharp.
+TEST_F(OutlineGpu, LinesOfSixtyFourPixelsEndThereToo) {
+    width_ = 200, height_ = 180;
+    const auto shapes = [](double x, double y) {
+        const double dx = x - 66, dy = y - 88;
+        if (std::hypot(dx, dy) < 13 + 8 * std::cos(5 * std::atan2(dy, dx))) return 1;
+        if (std::fabs(x - 190) < 4 && std::fabs(y - 6) < 5) return 2;
+        if (std::fabs(std::hypot(x - 188, y - 170) - 6) < 1.5) return 2;
+        return 0;
+    };
+    for (const std::vector<float>& widths : {std::vector<float>{64, 64}, {64, 40}, {33, 64}})
+        expect_exact(mask_of(shapes), widths);
 }
 
 TEST_F(OutlineGpu, AnEdgeAndADiscHaveLinesOfTheirWidth) {
@@ -230,6 +258,61 @@ TEST_F(OutlineGpu, AreTheSameFromEveryDistance) {
         const double radius = std::sqrt(area / std::numbers::pi);
         EXPECT_GT(radius, 3);
         EXPECT_NEAR(std::sqrt((area + changed) / std::numbers::pi) - radius, 4, 0.25) << far;
+    }
+}
+
+// A ball behind a wall, as an edit, an instance and a mesh: no line, unless it is asked for; then as wide as that of a ball that is seen, round
+// all of it.
+TEST_F(OutlineGpu, WhatIsHiddenHasALineWhereItIsAskedFor) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) GTEST_SKIP() << "no Vulkan device";
+    const vec3 at{0.2f, 0.1f, -1};
+    const float radius = 0.5f;
+    const Outline line{.color = {1, 0, 0}, .width_px = 4};
+    field::worlds::World wall{"wall",
+                              {field::worlds::edit(Box{.half_extents = {1.5f, 1.5f, 0.1f}}, {0, 0, 0.4f})},
+                              {.voxel_size = 0.05f, .bounds = {{-1.6f, -1.6f, -1.6f}, {1.6f, 1.6f, 0.6f}}}};
+    field::worlds::World both = wall;
+    both.edits.push_back(field::worlds::edit(Sphere{.radius = radius}, at));
+    for (const int kind : {0, 1, 2}) {
+        Frame frame = frame_of(kind == 0 ? both : wall, {0, 0, 3});
+        frame.camera.target = {0, 0, 0};
+        if (kind == 0) frame.outlines = {{frame.field->program().rows()[1], line}};
+        if (kind == 1) {
+            const Pose pose{at, axis_angle({0, 1, 0}, 0.7f)};
+            frame.instances = {{.bricks = rhi::must(field::BrickSet::make(
+                                    field::worlds::compiled({field::worlds::edit(Sphere{.radius = radius})}), 0.05f)),
+                                .pose = pose,
+                                .before = pose}};
+            frame.outlines = {{frame.instances[0].bricks->program().rows()[0], line, 0}};
+        }
+        if (kind == 2) {
+            frame.meshes = {meshes::at(meshes::sphere(radius, 64, meshes::matte({0.5f, 0.5f, 0.5f})), at)};
+            frame.meshes[0].outline = line;
+        }
+        const auto drawn = [&](bool hidden) {
+            return rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .outline_hidden = hidden}));
+        };
+        const Picture asked = drawn(true);
+        EXPECT_EQ(asked.rgba, drawn(false).rgba) << kind;
+        const auto red = [](const Picture& p) {
+            double sum = 0;
+            for (size_t i = 0; i < p.depth.size(); ++i) {
+                const bool full = p.srgb[4 * i] == 255 && p.srgb[4 * i + 1] == 0 && p.srgb[4 * i + 2] == 0;
+                const bool part = p.srgb[4 * i] > p.srgb[4 * i + 1] + 60;
+                sum += full ? 1.0 : part ? 0.5 : 0.0;
+            }
+            return sum;
+        };
+        EXPECT_EQ(red(drawn(false)), 0) << kind;
+        // The ring round its disc on the screen.
+        const shade::CameraParams eye = shade::camera_params(frame.camera, kWidth, kHeight);
+        const double far = std::sqrt(double(dot(at - frame.camera.position, at - frame.camera.position)));
+        const double pixels =
+            0.5 * kHeight / std::sqrt(double(eye.up.x * eye.up.x + eye.up.y * eye.up.y + eye.up.z * eye.up.z));
+        const double disc = pixels * double(radius) / std::sqrt(far * far - double(radius * radius));
+        const double ring = std::numbers::pi * ((disc + 4) * (disc + 4) - disc * disc);
+        EXPECT_NEAR(red(asked), ring, 0.1 * ring) << kind << ", 0.4 pixels of its width";
     }
 }
 

@@ -55,7 +55,7 @@ struct ShadowGpu : GpuTest {
         const Visibility seen = march(g, in);
         const Surface surface = resolve(g, in, seen.words, seen.words);
         const Readback bytes = g.readback(shadow(g, in, surface.seen, surface, cluster(g, in, surface.seen), {}));
-        const Readback depth = g.readback(surface.depth);
+        const Readback depth = g.readback(depth_of(g, in, surface.seen));
         rhi::must(runner_->execute(g));
         for (const float d : rhi::must(depth.get_as<float>())) EXPECT_NEAR(d, 6 * kVoxel, 0.1f * kVoxel);
         std::vector<float> out;

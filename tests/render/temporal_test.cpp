@@ -63,7 +63,7 @@ TEST_F(MotionGpu, IsTheReprojectionOfAWorldThatStandsStill) {
     in.motion = g.block(motion_params(frame.camera, before, kWidth, kHeight));
     const Visibility seen = march(g, in);
     const Surface surface = resolve(g, in, seen.words, seen.words);
-    const Readback moved = g.readback(motion(g, in, surface.seen)), depth = g.readback(surface.depth);
+    const Readback moved = g.readback(motion(g, in, surface.seen)), depth = g.readback(depth_of(g, in, surface.seen));
     rhi::must(runner_->execute(g));
     const std::vector<uint16_t> halves = rhi::must(moved.get_as<uint16_t>());
     const std::vector<float> metres = rhi::must(depth.get_as<float>());

@@ -205,6 +205,24 @@ TEST_F(TiersGpu, TheTreeIsBuiltAgainOnlyForOtherCells) {
     EXPECT_EQ(boxes.boxes(), box_cells(*field::worlds::boxes().field()).size());
 }
 
+// Rays end behind the triangles that are drawn before them, as those of compute do; what they would find there changes no pixel.
+TEST_F(TiersGpu, RaysThroughBoxesEndBehindTriangles) {
+    if (!device_->caps().rt_pipeline) return;
+    Frame frame = frame_of(on_ground());
+    model::Surface both = meshes::matte({0.6f, 0.6f, 0.6f});
+    both.double_sided = true;
+    const vec3 before = frame.camera.position * 0.6f;  // most of what the camera would see
+    frame.meshes = {meshes::at(meshes::sheet(-0.7f, -0.7f, 0.7f, 0.7f, both), before,
+                               axis_angle(normalize(cross(vec3{0, 1, 0}, before)), 0.9f))};
+    same(frame, Tier::Rt, true, "");
+    const uint64_t ended = renderer->stats().evaluations;
+    (void)rhi::must(renderer->render(frame, {.width = 96, .height = 72, .tier = Tier::Rt}));
+    const uint64_t by_rays = renderer->stats().evaluations;
+    (void)rhi::must(renderer->render(frame, {.width = 96, .height = 72, .tier = Tier::Rt, .cull_meshes = false}));
+    EXPECT_LT(by_rays, renderer->stats().evaluations);
+    EXPECT_GT(ended, 0u);
+}
+
 TEST_F(TiersGpu, MeshesByAMeshShaderAreThoseOfTheVertexShader) {
     Frame frame = frame_of(on_ground());
     frame.meshes.push_back(meshes::at(meshes::sphere(0.5f, 48, meshes::matte({0.8f, 0.3f, 0.2f})), {0.6f, 0.4f, 0.7f}));

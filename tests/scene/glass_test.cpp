@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -128,40 +129,58 @@ Picture many_rays(Renderer& renderer, const Frame& frame, const RenderSettings& 
     return out;
 }
 
-// Things that glow on their own behind and before glass: the path tracer's bounces between solid things would tell the two apart otherwise.
-TEST(GlassGpu, LooksAsThePathTracerSays) {
-    auto renderer = Renderer::create({.validation = true});
-    if (!renderer) {
+// A device, and worlds of glass among things that glow on their own: the path tracer's bounces between solid things would tell the two apart
+// otherwise. Materials a and b glow; the others, the edits and the camera are each test's.
+struct GlassPictures : testing::Test {
+    void SetUp() override {
+        auto made = Renderer::create({.validation = true});
+        if (made) {
+            renderer = std::make_unique<Renderer>(std::move(*made));
+            return;
+        }
         const char* required = std::getenv("REQUIRE_VULKAN");
-        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << renderer.error().message;
-        GTEST_SKIP() << renderer.error().message;
+        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << made.error().message;
+        GTEST_SKIP() << made.error().message;
     }
-    const auto world = World::parse(
-        R"({"format": 1, "field": {"voxel_size": 0.03, "bounds": {"min": [-3, -1.2, -3], "max": [3, 2, 1.5]}},
-      "materials": {"a": {"base_color": [0, 0, 0], "emissive": [0.8, 0.2, 0.1], "roughness": 1}, "b": {"base_color": [0, 0, 0], "emissive": [0.1, 0.5, 0.7], "roughness": 1},
-        "c": {"base_color": [0, 0, 0], "emissive": [0.7, 0.6, 0.2], "roughness": 1},
-        "clear": {"opacity": 0.000001, "roughness": 0.0}, "amber": {"opacity": 0.000001, "roughness": 0.0, "attenuation_color": [0.9, 0.4, 0.2], "attenuation_distance": 0.4}},
-      "edits": [{"id": "1", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [-1.2, 0, -2], "material": "a"},
+    static Frame frame_of(const std::string& materials, const std::string& edits, const std::string& camera) {
+        const auto world = World::parse(
+            R"({"format": 1, "field": {"voxel_size": 0.03, "bounds": {"min": [-3, -1.2, -3], "max": [3, 2, 1.5]}},
+      "materials": {"a": {"base_color": [0, 0, 0], "emissive": [0.8, 0.2, 0.1], "roughness": 1}, "b": {"base_color": [0, 0, 0], "emissive": [0.1, 0.5, 0.7], "roughness": 1}, )" +
+                materials + R"(}, "edits": [)" + edits +
+                R"(], "environment": {"color": [0.25, 0.3, 0.35]}, "lights": [{"type": "directional", "illuminance": 0}],
+      "cameras": {"main": {"target": [0, 0, 0], "fov_y_deg": 40, "tone_map": "neutral", "position": )" +
+                camera + "}}}",
+            "test.kiln.json");
+        EXPECT_TRUE(world) << world.error().message;
+        auto frame = world->frame();
+        EXPECT_TRUE(frame) << frame.error().message;
+        return std::move(*frame);
+    }
+    std::unique_ptr<Renderer> renderer;
+};
+struct GlassGpu : GlassPictures {};
+struct RoughGlassGpu : GlassPictures {};
+
+TEST_F(GlassGpu, LooksAsThePathTracerSays) {
+    const Frame frame = frame_of(
+        R"("c": {"base_color": [0, 0, 0], "emissive": [0.7, 0.6, 0.2], "roughness": 1},
+        "clear": {"opacity": 0.000001, "roughness": 0.0}, "amber": {"opacity": 0.000001, "roughness": 0.0, "attenuation_color": [0.9, 0.4, 0.2], "attenuation_distance": 0.4})",
+        R"({"id": "1", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [-1.2, 0, -2], "material": "a"},
         {"id": "2", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [0.2, 0.3, -2], "material": "b"},
         {"id": "3", "shape": "box", "half_extents": [0.4, 1, 0.2], "position": [1.5, 0, -2], "material": "c"},
         {"id": "4", "shape": "sphere", "radius": 0.2, "position": [0.5, -0.1, 0.2], "material": "c"},
         {"id": "ball", "shape": "sphere", "radius": 0.6, "position": [-0.6, 0, 0], "material": "clear"},
-        {"id": "block", "shape": "rounded_box", "half_extents": [0.4, 0.5, 0.4], "rounding": 0.1, "position": [0.6, 0, 0.2], "rotation": [0, 0.2588190, 0, 0.9659258], "material": "amber"}],
-      "environment": {"color": [0.25, 0.3, 0.35]}, "lights": [{"type": "directional", "illuminance": 0}],
-      "cameras": {"main": {"position": [0, 0.3, 3.4], "target": [0, 0, 0], "fov_y_deg": 40, "tone_map": "neutral"}}})",
-        "test.kiln.json");
-    ASSERT_TRUE(world) << world.error().message;
-    const auto frame = world->frame();
-    ASSERT_TRUE(frame) << frame.error().message;
+        {"id": "block", "shape": "rounded_box", "half_extents": [0.4, 0.5, 0.4], "rounding": 0.1, "position": [0.6, 0, 0.2], "rotation": [0, 0.2588190, 0, 0.9659258], "material": "amber"})",
+        "[0, 0.3, 3.4]");
     const RenderSettings settings{.width = 72, .height = 54};
-    const auto fast = many_rays(*renderer, *frame, settings);
-    const auto slow = render_reference(*frame, settings, 192);
+    const auto fast = many_rays(*renderer, frame, settings);
+    const auto slow = render_reference(frame, settings, 192);
     ASSERT_TRUE(slow) << slow.error().message;
     // Left a ball, right a block with something in it and many ways back and forth.
     EXPECT_LT(image::flip(shown(*slow, false), shown(fast, false)), 0.02);
     EXPECT_LT(image::flip(shown(*slow, true), shown(fast, true)), 0.03);
     // Glass is there at all.
-    Frame bare = *frame;
+    Frame bare = frame;
     std::erase_if(bare.instances, [](const Instance& i) { return i.glass != 0; });
     const auto without = renderer->render(bare, settings);
     ASSERT_TRUE(without);
@@ -170,36 +189,23 @@ TEST(GlassGpu, LooksAsThePathTracerSays) {
 }
 
 // Rough glass blurs what is behind it by how far it is behind: bars that touch a pane are seen in it, those far behind it are not.
-TEST(RoughGlassGpu, LooksAsThePathTracerSays) {
-    auto renderer = Renderer::create({.validation = true});
-    if (!renderer) {
-        const char* required = std::getenv("REQUIRE_VULKAN");
-        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << renderer.error().message;
-        GTEST_SKIP() << renderer.error().message;
-    }
-    const auto world = World::parse(
-        R"({"format": 1, "field": {"voxel_size": 0.03, "bounds": {"min": [-3, -1.2, -3], "max": [3, 2, 1.5]}},
-      "materials": {"a": {"base_color": [0, 0, 0], "emissive": [0.8, 0.2, 0.1], "roughness": 1}, "b": {"base_color": [0, 0, 0], "emissive": [0.1, 0.5, 0.7], "roughness": 1},
-        "frosted": {"opacity": 0.000001, "roughness": 0.4}, "smeared": {"opacity": 0.000001, "roughness": 0.45}},
-      "edits": [{"id": "1", "shape": "box", "half_extents": [0.15, 1, 0.1], "position": [-1.1, 0, -1.2], "material": "a"},
+TEST_F(RoughGlassGpu, LooksAsThePathTracerSays) {
+    const Frame frame = frame_of(
+        R"("frosted": {"opacity": 0.000001, "roughness": 0.4}, "smeared": {"opacity": 0.000001, "roughness": 0.45})",
+        R"({"id": "1", "shape": "box", "half_extents": [0.15, 1, 0.1], "position": [-1.1, 0, -1.2], "material": "a"},
         {"id": "2", "shape": "box", "half_extents": [0.15, 1, 0.1], "position": [-0.5, 0, -1.2], "material": "b"},
         {"id": "3", "shape": "box", "half_extents": [0.1, 0.8, 0.05], "position": [-0.8, 0, -0.05], "material": "a"},
         {"id": "4", "shape": "box", "half_extents": [0.2, 1, 0.1], "position": [0.9, 0.3, -1.2], "material": "b"},
         {"id": "pane", "shape": "box", "half_extents": [0.6, 0.7, 0.05], "position": [-0.8, 0, 0.15], "material": "frosted"},
-        {"id": "ball", "shape": "sphere", "radius": 0.55, "position": [0.75, 0, 0], "material": "smeared"}],
-      "environment": {"color": [0.25, 0.3, 0.35]}, "lights": [{"type": "directional", "illuminance": 0}],
-      "cameras": {"main": {"position": [0, 0.2, 3.2], "target": [0, 0, 0], "fov_y_deg": 40, "tone_map": "neutral"}}})",
-        "test.kiln.json");
-    ASSERT_TRUE(world) << world.error().message;
-    const auto frame = world->frame();
-    ASSERT_TRUE(frame) << frame.error().message;
+        {"id": "ball", "shape": "sphere", "radius": 0.55, "position": [0.75, 0, 0], "material": "smeared"})",
+        "[0, 0.2, 3.2]");
     const RenderSettings settings{.width = 64, .height = 40};
-    const auto slow = render_reference(*frame, settings, 192);
+    const auto slow = render_reference(frame, settings, 192);
     ASSERT_TRUE(slow) << slow.error().message;
-    const Picture fast = many_rays(*renderer, *frame, settings);
-    const auto one_ray = renderer->render(*frame, settings);
+    const Picture fast = many_rays(*renderer, frame, settings);
+    const auto one_ray = renderer->render(frame, settings);
     ASSERT_TRUE(one_ray) << one_ray.error().message;
-    Frame as_smooth = *frame;
+    Frame as_smooth = frame;
     for (Material& m : as_smooth.materials)
         if (m.opacity < 1) m.roughness = 0;
     const Picture smooth = many_rays(*renderer, as_smooth, settings);

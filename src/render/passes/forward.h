@@ -7,19 +7,21 @@
 namespace kiln::render {
 
 extern const RasterKernel kLines, kOutlineHull;
-extern const Kernel kLinesOver, kOutlineMeshes;
+extern const Kernel kLinesOver, kOutlineMeshes, kOutlineHidden, kOutlineHiddenMeshes;
 extern const Kernel kMarchGlass, kThroughBegin, kThroughLayer, kThroughSurface, kThroughBend, kThroughBendImage,
     kThroughTotal, kThroughEnd, kThroughFront, kMeshTrace, kShadowGlass;
 extern const Kernel kParticles, kParticlesStart, kParticlesLight, kParticlesLightImage;
 
-// What each pixel shows first, transparent or not; without anything transparent the surface as it is, and images that are not read.
+// What each pixel shows first, transparent or not; without anything transparent what is solid as it is, and images that are not read.
 struct Front {
-    Surface surface;
+    Image seen, depth;
     Image light;  // of that alone
     Image left;   // share of light from behind it that comes through
 };
 // Radiance with what lets light through.
 Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image& radiance);
+// Glass along rays where it is nearer than what is solid; in.instances: of_glass().
+Image march_glass(Graph& g, const TileInputs& in, const Image& solid);
 // What glass leaves of lights first_light … + 15: the fractions are less by it, and the colours that the light pass takes.
 std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
                                 const Buffer& light_masks, uint32_t first_light, Image& fractions);
@@ -31,8 +33,10 @@ void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Fr
 
 // Meshes with an outline into the mask; their records follow `records_before` others.
 void mark_meshes(Graph& g, const TileInputs& in, const Image& visibility, uint32_t records_before, OutlineMask& mask);
+// … and what something hides of outlined edits and meshes, where nothing outlined is seen.
+void mark_hidden(Graph& g, const TileInputs& in, OutlineMask& mask);
 // The finished picture with outlines of meshes by a stencil and larger hulls; see outline_hull.vert.
-Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const Image& shown);
+Image draw_hulls(Graph& g, const TileInputs& in, const Image& seen, const Image& depth, const Image& shown);
 // The finished picture with something over it: colour times share, and share.
 Image lay_over(Graph& g, const Image& drawn, const Image& shown);
 

@@ -27,7 +27,7 @@ void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, 
         kResolveInstances, in.size,
         {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records), g.read(in.rays),
          g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances), g.read(in.field.materials),
-         g.read(visibility), g.read(refined), g.write(surface.words), g.write(surface.depth), g.write(surface.seen)});
+         g.read(visibility), g.read(refined), g.write(surface.words), g.write(surface.seen)});
 }
 
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,

@@ -26,19 +26,19 @@ Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth) {
         ((in.size.width + kTileGroup - 1) / kTileGroup) * ((in.size.height + kTileGroup - 1) / kTileGroup);
     const FieldHandles& f = in.field;
     Image words = g.create("visibility", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    Image ends;
+    if (mesh_depth != nullptr) {
+        ends = *mesh_depth;
+    } else {
+        ends = g.create("no mesh depth", {.size = {1, 1}, .format = rhi::Format::R32Float});
+        g.clear(ends);
+    }
     if (in.analytic) {
         g.clear(words);
     } else if (in.rt) {
-        out.evaluations.push_back(march_boxes(g, in, words));
+        out.evaluations.push_back(march_boxes(g, in, ends, words));
     } else {
         Buffer counted = g.create_buffer("march evaluations", uint64_t{groups} * 4);
-        Image ends;
-        if (mesh_depth != nullptr) {
-            ends = *mesh_depth;
-        } else {
-            ends = g.create("no mesh depth", {.size = {1, 1}, .format = rhi::Format::R32Float});
-            g.clear(ends);
-        }
         std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),  g.read(in.rays),  g.read(f.distances),
                               g.write(words),      g.read(f.tables), g.write(counted), g.read(ends)};
         if (in.levels) uses.push_back(g.uniform(in.levels_block));

@@ -47,14 +47,7 @@ LevelHit world_march(TexelRay ray, float t_min, float t_max, bool accelerate) {
 #include "render/passes/march_sets.glsl"
 #endif
 
-// Where a ray has passed the triangle that the rasteriser found, by as much as refining may move a hit: what is behind is not seen. Voxels.
-float ray_end(ivec2 pixel, vec3 direction) {
-    if ((frame.flags & kFrameRayEnds) == 0u) return kFarVoxels;
-    float depth = texelFetch(mesh_depth, pixel, 0).x;
-    if (depth <= 0.0) return kFarVoxels;
-    float t = kMeshNear / (depth * dot(direction, frame.camera.forward.xyz) * frame.grid.voxel_size);
-    return min(t * 1.002 + frame.refine_reach, kFarVoxels);
-}
+#include "render/passes/ray_end.glsl"
 
 shared uint group_evaluations;
 

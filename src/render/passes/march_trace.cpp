@@ -15,14 +15,14 @@ const TraceKernel kMarchTrace{.name = "march by boxes",
                               .intersection = kMarchTraceRintSpv,
                               .closest_hit = kMarchTraceRchitSpv};
 
-Buffer march_boxes(Graph& g, const TileInputs& in, Image& words) {
+Buffer march_boxes(Graph& g, const TileInputs& in, const Image& ends, Image& words) {
     const auto tiles = [](uint32_t pixels) { return (pixels + kTileGroup - 1) / kTileGroup; };
     Buffer counted = g.create_buffer("march evaluations", uint64_t{tiles(in.size.width)} * tiles(in.size.height) * 4);
     g.clear(counted);
     const FieldHandles& f = in.field;
     g.trace(kMarchTrace, in.size,
             {g.uniform(in.frame), g.read(f.cells), g.read(in.rays), g.read(f.distances), g.write(words),
-             g.read(f.tables), g.read_write(counted), g.read(in.boxes.cells), g.read(in.boxes.tree)});
+             g.read(f.tables), g.read_write(counted), g.read(in.boxes.cells), g.read(in.boxes.tree), g.read(ends)});
     return counted;
 }
 

@@ -5,6 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
+#include "render/passes/mesh.gpu.h"
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
@@ -12,10 +13,12 @@ layout(set = 0, binding = 2, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 3) uniform texture3D distances;
 layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 7, std430) readonly buffer BoxCells { uint box_cells[]; };
+layout(set = 0, binding = 9) uniform texture2D mesh_depth;
 
 #include "render/passes/field.glsl"
 #include "field/box_march.gpu.h"
 #include "render/passes/rays.glsl"
+#include "render/passes/ray_end.glsl"
 
 const uint kNoBox = 0xffffffffu;
 

@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// What points of meshes look like: normal, material, depth, into the words that resolve leaves empty there.
+// What points of meshes look like: normal and material, into the words that resolve leaves empty there.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -16,8 +16,7 @@ layout(set = 0, binding = 4, std430) readonly buffer Vertices { MeshVertex mesh_
 layout(set = 0, binding = 5, std430) readonly buffer Surfaces { MeshSurface mesh_surfaces[]; };
 layout(set = 0, binding = 6) uniform utexture2D visibility;
 layout(set = 0, binding = 7, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 8, r32f) writeonly uniform image2D depth;  // metres along the ray
-#define KILN_PAGES 9
+#define KILN_PAGES 8
 #include "render/passes/mesh_textures.glsl"
 #include "render/passes/mesh.glsl"
 #include "render/passes/rays.glsl"
@@ -98,5 +97,4 @@ void main() {
     // The share that it covers, for through_bend.comp.
     if ((part.flags & kMeshBlend) != 0u) words.x |= uint(clamp(color.a * look_of.alpha * texels[0].a, 0.0, 1.0) * 255.0 + 0.5) << 24u;
     imageStore(surface_words, pixel, words);
-    imageStore(depth, pixel, vec4(uintBitsToFloat(seen.x) * frame.grid.voxel_size));
 }

@@ -121,9 +121,8 @@ Image see_meshes(Graph& g, const TileInputs& in, const Image& ids, const Image& 
 
 void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface) {
     const MeshHandles& m = in.meshes;
-    std::vector<Use> uses{g.uniform(in.frame),  g.read(in.rays),        g.read(m.parts),
-                          g.read(m.corners),    g.read(m.vertices),     g.read(m.surfaces),
-                          g.read(surface.seen), g.write(surface.words), g.write(surface.depth)};
+    std::vector<Use> uses{g.uniform(in.frame), g.read(in.rays),    g.read(m.parts),      g.read(m.corners),
+                          g.read(m.vertices),  g.read(m.surfaces), g.read(surface.seen), g.write(surface.words)};
     for (const Image& page : m.pages) uses.push_back(g.read(page));
     uses.push_back(g.sampler(kTrilinear));
     g.dispatch(kMeshResolve, in.size, uses);

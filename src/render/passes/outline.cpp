@@ -98,6 +98,7 @@ Image outline(Graph& g, const TileInputs& in, const Image& visibility, const Ima
         mask.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
     }
     mark_meshes(g, in, visibility, in.outline_count, mask);
+    if (in.outline_hidden) mark_hidden(g, in, mask);
     if (in.upscales) mask = upscale_mask(g, in, mask);
     const Image seeds = outline_flood(g, in.outlines, mask, in.widest_outline);
     Image out = g.create("shown outlined", {.size = shown.size, .format = rhi::Format::Rgba8Unorm});

@@ -29,13 +29,7 @@ layout(push_constant) uniform Push { OutlinePush push; };
 #include "render/passes/rays.glsl"
 #include "render/passes/instance_rays.glsl"
 
-// Does the code at hand belong to the object of `here`?
-bool of_object = false;
-uvec2 sdf_code(uint at) { return code[at]; }
-float sdf_param(uint at) { return of_object ? instance_numbers[here.params_first + at] : numbers[frame.params_first + at]; }
-float sdf_sample(uint at) { return of_object ? instance_numbers[here.samples_first + at] : numbers[at]; }
-#include "render/passes/tape_use.glsl"
-#include "sdf/tape.glsl"
+#include "render/passes/outline_tape.glsl"
 
 // Trilinear surfaces are this far from their code's at most, where they are not refined.
 const float kSurfaceVoxels = 0.6;

@@ -29,11 +29,11 @@ void mark_meshes(Graph& g, const TileInputs& in, const Image& visibility, uint32
                OutlinePush{int(in.size.width), int(in.size.height), 0, records_before});
 }
 
-Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const Image& shown) {
+Image draw_hulls(Graph& g, const TileInputs& in, const Image& seen, const Image& depth, const Image& shown) {
     OutlineMask mask;
     mask.owners = g.create("outline owners", {.size = in.size, .format = rhi::Format::R32Uint});
     mask.seeds = g.create("outline seeds", {.size = in.size, .format = rhi::Format::R32Uint});
-    mark_meshes(g, in, surface.seen, 0, mask);
+    mark_meshes(g, in, seen, 0, mask);
     const MeshHandles& m = in.meshes;
     Image drawn = g.create("outline hulls", {.size = in.size, .format = rhi::Format::Rgba16Float});
     rhi::Load load = rhi::Load::Clear;
@@ -43,7 +43,7 @@ Image draw_hulls(Graph& g, const TileInputs& in, const Surface& surface, const I
         const DrawCall call{.vertices = 3 * kMeshCluster, .instances = o.clusters};
         g.draw(kOutlineHull, {.colors = {{.image = &drawn, .load = load}}},
                {g.uniform(in.frame), g.read(m.clusters), g.read(m.parts), g.read(m.corners), g.read(m.vertices),
-                g.read(mask.owners), g.read(surface.depth)},
+                g.read(mask.owners), g.read(depth)},
                HullPush{o.middle.x, o.middle.y, o.middle.z, o.first_cluster, o.outline.color.x, o.outline.color.y,
                         o.outline.color.z, i + 1},
                {&call, 1});

@@ -75,15 +75,14 @@ void draw_particles(Graph& g, const TileInputs& in, const Image& solid_depth, Fr
     Image out = g.create("radiance with particles", {.size = in.size, .format = rhi::Format::Rgba16Float});
     Image depth_now = g.create("front depth", {.size = size, .format = rhi::Format::R32Float});
     Image motion_now = g.create("motion", {.size = size, .format = rhi::Format::Rgba16Float});
-    g.dispatch(
-        kParticles, in.size,
-        {g.uniform(in.frame), g.uniform(in.motion), g.read(p.records), g.read(light), g.read(p.ends), g.read(p.numbers),
-         g.read(radiance), g.read(solid_depth), g.read(front.surface.depth), g.read(front.light), g.read(front.left),
-         g.read(motion), g.write(out), g.write(depth_now), g.write(motion_now)},
-        push);
+    g.dispatch(kParticles, in.size,
+               {g.uniform(in.frame), g.uniform(in.motion), g.read(p.records), g.read(light), g.read(p.ends),
+                g.read(p.numbers), g.read(radiance), g.read(solid_depth), g.read(front.depth), g.read(front.light),
+                g.read(front.left), g.read(motion), g.write(out), g.write(depth_now), g.write(motion_now)},
+               push);
     radiance = out;
     if (!in.taa) return;
-    front.surface.depth = depth_now;
+    front.depth = depth_now;
     motion = motion_now;
 }
 

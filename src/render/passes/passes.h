@@ -27,8 +27,8 @@ namespace kiln::render {
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kResolve,
     kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
-    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kLight, kLightImage, kLightGlass, kLightGlassImage, kTonemap,
-    kView;
+    kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kDepthOf, kLight, kLightImage, kLightGlass, kLightGlassImage,
+    kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
 extern const Kernel kDepthPyramid, kDepthPyramidRest, kMeshCull, kMeshPack, kMeshPick;
 extern const Kernel kMeshSee, kMeshResolve, kMeshShadow, kMeshShadowHoles;
@@ -167,14 +167,15 @@ struct TileInputs {
     CascadeHandles cascades;
     bool has_lamps = false;
     LampHandles lamps;
-    bool maps_alone = false;    // no light has rays for what meshes hide of it
-    uint32_t volume_count = 0;  // lights that are rasterised
-    Buffer volumes;             // their numbers
-    bool upscales = false;      // with taa: the rays of a smaller picture are made into this one over time
-    rhi::Extent shown_size;     // of the picture: else `size`
-    vec2 jitter;                // where in its pixels this frame looks
-    uint32_t picture = 0;       // of the row of pictures that becomes one over time
-    uint32_t ao_every = 0;      // pixel of a row, and row, has rays of ambient occlusion; 0: there is none
+    bool maps_alone = false;      // no light has rays for what meshes hide of it
+    uint32_t volume_count = 0;    // lights that are rasterised
+    Buffer volumes;               // their numbers
+    bool upscales = false;        // with taa: the rays of a smaller picture are made into this one over time
+    rhi::Extent shown_size;       // of the picture: else `size`
+    vec2 jitter;                  // where in its pixels this frame looks
+    uint32_t picture = 0;         // of the row of pictures that becomes one over time
+    uint32_t ao_every = 0;        // pixel of a row, and row, has rays of ambient occlusion; 0: there is none
+    bool outline_hidden = false;  // outlined things have lines where something hides them too
 };
 
 // Visibility words, and the evaluations of each workgroup of each march.
@@ -185,14 +186,15 @@ struct Visibility {
 const Kernel& march_kernel(const TileInputs& in);
 // First hits on the field and on instances. With `mesh_depth` (and kFrameRayEnds) rays end where they have passed what it shows.
 Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth = nullptr);
-// The words of the bricks, by rays through in.boxes; what it answers counts evaluations.
-Buffer march_boxes(Graph& g, const TileInputs& in, Image& words);
+// The words of the bricks, by rays through in.boxes that end behind `ends` (with kFrameRayEnds); what it answers counts evaluations.
+Buffer march_boxes(Graph& g, const TileInputs& in, const Image& ends, Image& words);
 
 struct Surface {
     Image words;  // packed G-buffer, see surface.glsl
-    Image depth;  // metres along the ray, +infinity where nothing is hit
     Image seen;   // visibility words, with t where the surface is
 };
+// Metres along the ray of what resolved words see, +infinity where that is nothing.
+Image depth_of(Graph& g, const TileInputs& in, const Image& seen);
 // `refined`: what refine() answers; any image of words without kFrameRefine.
 Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
 
@@ -280,6 +282,6 @@ Image tonemap(Graph& g, const Image& radiance, const Image& glow, const Buffer& 
 struct Shown {
     Image values, bytes;
 };
-Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Image& depth);
 
 }  // namespace kiln::render

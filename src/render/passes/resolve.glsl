@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What each visible point looks like: normal, material, depth; once per pixel. With KILN_EXACT also points found on exact code.
+// What each visible point looks like: normal, material; once per pixel. With KILN_EXACT also points found on exact code.
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
@@ -14,19 +14,18 @@ layout(set = 0, binding = 7) uniform utexture3D materials;
 layout(set = 0, binding = 8) uniform utexture2D visibility;
 layout(set = 0, binding = 9) uniform utexture2D refined;  // see refine.comp; not read without kFrameRefine
 layout(set = 0, binding = 10, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 11, r32f) writeonly uniform image2D depth;  // metres along the ray
-layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D visibility_now;
+layout(set = 0, binding = 11, rgba32ui) writeonly uniform uimage2D visibility_now;
 #ifdef KILN_EXACT
-layout(set = 0, binding = 13, std430) readonly buffer Code { uvec2 code[]; };
-layout(set = 0, binding = 14, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
-layout(set = 0, binding = 15, std430) readonly buffer Numbers { float numbers[]; };
+layout(set = 0, binding = 12, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 13, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 14, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 
 #ifdef KILN_LEVELS
 #ifdef KILN_EXACT
-const uint kLevelsBinding = 16u;
+const uint kLevelsBinding = 15u;
 #else
-const uint kLevelsBinding = 13u;
+const uint kLevelsBinding = 12u;
 #endif
 layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
 #endif
@@ -54,7 +53,6 @@ void main() {
     if (state == kSeenNothing || state == kSeenMesh) {  // meshes: mesh_resolve fills them in
         imageStore(visibility_now, pixel, seen);
         imageStore(surface_words, pixel, uvec4(0u));
-        imageStore(depth, pixel, vec4(uintBitsToFloat(0x7f800000u)));
         return;
     }
     TexelRay ray = pixel_ray(pixel);
@@ -123,5 +121,4 @@ void main() {
     seen.x = floatBitsToUint(t);
     imageStore(visibility_now, pixel, seen);
     imageStore(surface_words, pixel, pack_surface(s));
-    imageStore(depth, pixel, vec4(t * frame.grid.voxel_size));
 }

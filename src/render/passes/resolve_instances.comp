@@ -21,8 +21,7 @@ layout(set = 0, binding = 9) uniform utexture3D materials;
 layout(set = 0, binding = 10) uniform utexture2D visibility;
 layout(set = 0, binding = 11) uniform utexture2D refined;  // see refine.comp; not read without kFrameRefine
 layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 13, r32f) writeonly uniform image2D depth;  // metres along the ray
-layout(set = 0, binding = 14, rgba32ui) writeonly uniform uimage2D visibility_now;
+layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visibility_now;
 
 #include "render/passes/refine.gpu.h"
 #define KILN_FIELD_SURFACE
@@ -71,5 +70,4 @@ void main() {
     seen.x = floatBitsToUint(t);
     imageStore(visibility_now, pixel, seen);
     imageStore(surface_words, pixel, pack_surface(s));
-    imageStore(depth, pixel, vec4(t * frame.grid.voxel_size));
 }

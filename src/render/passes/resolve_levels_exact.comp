@@ -1,6 +1,6 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// Normals, materials and depth of points seen in bricks of any level and on exact programs.
+// Normals and materials of points seen in bricks of any level and on exact programs.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"

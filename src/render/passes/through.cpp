@@ -86,24 +86,14 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
     TileInputs of_glass = in;
     of_glass.instances = in.instances.of_glass();
     Layer out;
-    out.nearest = solid;
-    if (const InstanceHandles& i = of_glass.instances) {
-        out.nearest = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-        g.dispatch(
-            kMarchGlass, in.size,
-            {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-             g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out.nearest)},
-            InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = 0, .pad_0 = 0});
-    }
+    out.nearest = of_glass.instances ? march_glass(g, of_glass, solid) : solid;
     if (in.has_blends) out.nearest = trace_meshes(g, in, out.nearest, true);
     Image found = g.create("through found", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.seen = g.create("through seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.words = g.create("through surface", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-    out.surface.depth = g.create("through depth", {.size = in.size, .format = rhi::Format::R32Float});
     g.dispatch(kThroughLayer, in.size,
                {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(out.nearest),
-                g.read(carried), g.write(found), g.write(out.surface.seen), g.write(out.surface.words),
-                g.write(out.surface.depth)},
+                g.read(carried), g.write(found), g.write(out.surface.seen), g.write(out.surface.words)},
                push);
     if (of_glass.instances) {
         Image refined = found;
@@ -182,8 +172,7 @@ Brought bring(Graph& g, const TileInputs& tile, const Block& frame_of_rays, Ways
         push.step = (i == 0 ? ways.step | kThroughBegins : with_parts) | (i == steps ? kThroughLast : 0);
         const bool of_camera = (push.step & kThroughCamera) != 0;
         const Image solid_seen = of_camera ? solid.seen : solid_along(g, in);
-        Layer layer{
-            {solid_seen, solid.light, solid_seen}, solid_seen, solid_seen, solid.light};  // not read in the last
+        Layer layer{{solid_seen, solid_seen}, solid_seen, solid_seen, solid.light};  // not read in the last
         if (i < steps) layer = layer_along(g, in, solid_seen, carried, push);
         Buffer rays = g.create_buffer("through rays", ray_bytes);
         Image carried_now = g.create("through carried", {.size = size, .format = rhi::Format::Rgba16Float});
@@ -271,11 +260,11 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
     }
     if (wants_front(tile)) {
         const First& first = brought.first;
-        g.dispatch(kThroughFront, in.size,
-                   {g.read(first.surface.seen), g.read(first.surface.depth), g.read(first.sum), g.read(first.carried),
-                    g.read(parted), g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light),
-                    g.write(front.left)},
-                   push);
+        g.dispatch(
+            kThroughFront, in.size,
+            {g.uniform(in.frame), g.read(first.surface.seen), g.read(first.sum), g.read(first.carried), g.read(parted),
+             g.write(front.seen), g.write(front.depth), g.write(front.light), g.write(front.left)},
+            push);
     }
     g.dispatch(kThroughEnd, in.size,
                {g.uniform(in.frame), g.read(or_any(in.instances.glass, in)), g.read(brought.total), g.read(parted),
@@ -286,12 +275,25 @@ void draw_part(Graph& g, const TileInputs& tile, const ThroughPart& part, const 
 
 }  // namespace
 
+Image march_glass(Graph& g, const TileInputs& in, const Image& solid) {
+    const InstanceHandles& i = in.instances;
+    Image out = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    g.dispatch(kMarchGlass, in.size,
+               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
+                g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out)},
+               InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = 0, .pad_0 = 0});
+    return out;
+}
+
 Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image& radiance) {
-    Front front{surface, radiance, radiance};
-    if (in.through.empty()) return front;
+    Front front{surface.seen, {}, radiance, radiance};
+    if (in.through.empty()) {
+        front.depth = depth_of(g, in, surface.seen);
+        return front;
+    }
     if (wants_front(in)) {
-        front.surface.seen = g.create("front seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-        front.surface.depth = g.create("front depth", {.size = in.size, .format = rhi::Format::R32Float});
+        front.seen = g.create("front seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+        front.depth = g.create("front depth", {.size = in.size, .format = rhi::Format::R32Float});
         front.light = g.create("front light", {.size = in.size, .format = rhi::Format::Rgba16Float});
         front.left = g.create("front left", {.size = in.size, .format = rhi::Format::Rgba16Float});
         const ThroughPush all{.from_x = 0,
@@ -302,11 +304,10 @@ Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image
                               .passed = 0,
                               .picture = 0,
                               .pad_0 = 0};
-        g.dispatch(
-            kThroughFront, in.size,
-            {g.read(surface.seen), g.read(surface.depth), g.read(radiance), g.read(radiance), g.read(radiance),
-             g.write(front.surface.seen), g.write(front.surface.depth), g.write(front.light), g.write(front.left)},
-            all);
+        g.dispatch(kThroughFront, in.size,
+                   {g.uniform(in.frame), g.read(surface.seen), g.read(radiance), g.read(radiance), g.read(radiance),
+                    g.write(front.seen), g.write(front.depth), g.write(front.light), g.write(front.left)},
+                   all);
     }
     for (const ThroughPart& part : in.through) draw_part(g, in, part, surface, radiance, front);
     return front;

@@ -16,7 +16,6 @@ layout(set = 0, binding = 3) uniform texture2D carried;
 layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D found;
 layout(set = 0, binding = 5, rgba32ui) writeonly uniform uimage2D seen;  // the same, to be refined
 layout(set = 0, binding = 6, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 7, r32f) writeonly uniform image2D depth;
 layout(push_constant) uniform Push { ThroughPush push; };
 
 void main() {
@@ -32,5 +31,4 @@ void main() {
     imageStore(found, pixel, word);
     imageStore(seen, pixel, word);
     imageStore(surface_words, pixel, uvec4(0u));
-    imageStore(depth, pixel, vec4(uintBitsToFloat(0x7f800000u)));
 }
