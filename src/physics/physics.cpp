@@ -374,8 +374,11 @@ void World::step(float seconds) {
     }
     pairs_.clear();
     collect(pairs_);
-    std::sort(pairs_.begin(), pairs_.end(),
-              [](const Pair& p, const Pair& q) { return std::tie(p.a, p.b, q.depth) < std::tie(q.a, q.b, p.depth); });
+    // To the last bit: engines tell them in any order, and sums and loads depend on it.
+    const auto key = [](const Pair& p) {
+        return std::tuple(p.a, p.b, -p.depth, p.point.x, p.point.y, p.point.z, p.normal.x, p.normal.y, p.normal.z);
+    };
+    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& p, const Pair& q) { return key(p) < key(q); });
     find_supports(seconds);
     events_.clear();
     std::vector<Touch>& touches = touches_before_;  // what is of no more use

@@ -162,8 +162,9 @@ TEST_P(EachEngine, TheSameStepsGiveTheSameBytesForAnyNumberOfThreads) {
     for (const int threads : {1, 2}) {
         auto world = make_world(GetParam(), {.threads = threads});
         ASSERT_TRUE(world);
-        ASSERT_TRUE((*world)->add(
-            {.shape = worlds::fixed({edit(Plane{}), edit(kiln::Sphere{.radius = 1})}), .motion = Motion::Static}));
+        ASSERT_TRUE((*world)->add({.shape = worlds::fixed({edit(Plane{}), edit(kiln::Sphere{.radius = 1})}),
+                                   .motion = Motion::Static,
+                                   .rolling_friction = 0.2f}));
         const auto torus = moving({edit(kiln::Torus{.major_radius = 0.4f, .minor_radius = 0.15f})});
         std::vector<BodyId> ids;
         for (int i = 0; i < 40; ++i) {

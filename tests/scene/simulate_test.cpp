@@ -476,6 +476,10 @@ TEST(SlowSimulate, BouldersComeToRestInTheQuarryWithoutFallingThroughOrTrembling
     scene["physics"]["rolling_friction"] = 0.25;
     const World world = parsed(scene.dump());
     for (const std::string& engine : engines())
+        EXPECT_EQ(run(world, {.seconds = 4, .backend = engine, .threads = 1}),
+                  run(world, {.seconds = 4, .backend = engine, .threads = 2}))
+            << engine;
+    for (const std::string& engine : engines())
         for (const bool meshed : {false, true}) {
             const Rest rest = rest_of(world, engine, meshed);
             // They fall from the air, and some roll over an edge and fall again.
