@@ -180,7 +180,7 @@ TEST(RoughCells, RaysMeetTheSameThingsBeforeAnythingIsSettled) {
     worlds::Random r(3);
     dvec3 at{0, 0.5, 0};
     int hits = 0, rough = 0;
-    for (int frame = 0; frame < 12; ++frame) {
+    for (int frame = 0; frame < 9; ++frame) {
         if (frame % 8 == 7) at = {double(r.in(-30, 30)), 0.5, double(r.in(-30, 30))};
         at.x += 0.7;
         map.move(at);
@@ -191,10 +191,9 @@ TEST(RoughCells, RaysMeetTheSameThingsBeforeAnythingIsSettled) {
             map.edit(live.program(), live.become(edits));
         }
         map.work({.bricks = frame % 2 == 0 ? 400u : 3000u, .layers = 0});
-        for (const int level : {frame % 4, (frame + 2) % 4}) {
-            expect_true_words(map, level, true);
-            rough += rough_words(map, level);
-        }
+        const int level = (frame + 2) % 4;
+        expect_true_words(map, level, true);
+        rough += rough_words(map, level);
         for (int i = 0; i < 60; ++i) {
             const dvec3 from{at.x + double(r.in(-6, 6)), 9, at.z + double(r.in(-6, 6))};
             const vec3 along = normalize(vec3{r.in(-1, 1), -1, r.in(-1, 1)});
@@ -205,7 +204,7 @@ TEST(RoughCells, RaysMeetTheSameThingsBeforeAnythingIsSettled) {
             hits += quick.state == kMarchHit;
         }
     }
-    EXPECT_GT(hits, 400);
+    EXPECT_GT(hits, 300);
     EXPECT_GT(rough, 1000);
     // A layer, then the rest.
     EXPECT_FALSE(map.work({.bricks = 1, .layers = 1}));
