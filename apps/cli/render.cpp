@@ -48,7 +48,7 @@ void add_render(CLI::App& app, Run& run) {
                      "things of glass that one ray may go through, 0 to 16 (default 4, or as the quality says)");
     verb->add_flag("--no-refine", o->no_refine, "leave hits where the bricks have them, not where the edits do");
     verb->add_flag("--all-lights", o->all_lights, "every light at every pixel: the slow twin of the lists by tile");
-    verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy");
+    verb->add_flag("--atlas-by-copy", o->atlas_by_copy, "bake to a buffer and copy")->group("");  // for who works on it
     verb->add_flag("--taa", o->taa,
                    "anti-alias over time: by the pictures before with --path, else by sixteen of one view");
     verb->add_option("--quality", o->quality,
@@ -56,9 +56,7 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("--scale", o->scale,
                      "with --taa: rays a pixel along each side, 0.25 to 1; the picture is made whole over time")
         ->capture_default_str();
-    verb->add_option("--ao", o->ao,
-                     "ambient occlusion: off, half (rays of one pixel in four) or full; left out: what --quality says, "
-                     "else full");
+    verb->add_option("--ao", o->ao, "ambient occlusion: off, half or full");
     verb->add_option("--lighting", o->lighting,
                      "of lamps and spots: clusters (lists by tile), or volumes (rasterised and added up): the same "
                      "picture")

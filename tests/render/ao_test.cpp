@@ -211,6 +211,7 @@ TEST_F(AoGpu, ABallOnAPlaneHidesWhatItsFormFactorSays) {
         const Apart all = apart(p, frame.camera, 0, beside(0, 0, r));
         EXPECT_GT(all.judged, 700);
         EXPECT_LE(all.worst, worst) << "half: " << (ao == AmbientOcclusion::Half);
+        EXPECT_LE(all.worst_by_edge, ao == AmbientOcclusion::Full ? 0.09 : 0.2);
         EXPECT_LE(all.mean, mean);
         for (const double x : {1.0, 2.0, 4.0}) {
             const Apart at = apart(p, frame.camera, 0, beside(0, 0, r, x - 0.08, x + 0.08));
@@ -220,6 +221,21 @@ TEST_F(AoGpu, ABallOnAPlaneHidesWhatItsFormFactorSays) {
         }
         EXPECT_GT(renderer->stats().pass_evaluations.back().second, 1000u);
         EXPECT_TRUE(renderer->stats().pass_evaluations.back().first.starts_with("ao"));
+    }
+}
+
+// The top of a plate over a plane is open up to its rim, though what is seen past it is not.
+TEST_F(AoGpu, TheMeanCrossesNoEdge) {
+    field::worlds::World w = plane_world();
+    w.edits.push_back(edit(Box{.half_extents = {0.5f, 0.05f, 0.4f}}, {0, 0.3f, 0}));
+    const Frame frame = looking_down(w);
+    for (const AmbientOcclusion ao : {AmbientOcclusion::Full, AmbientOcclusion::Half}) {
+        const Picture p = open(frame, {.width = 128, .height = 96, .ao = ao});
+        const Apart top = apart(p, frame.camera, 0.35f, [](vec3) { return 1.0; });
+        EXPECT_GT(top.judged, 1000);
+        EXPECT_LE(std::max(top.worst, top.worst_by_edge), 0.02);
+        const Apart below = apart(p, frame.camera, 0, [](vec3) { return 1.0; });
+        EXPECT_GE(below.worst_by_edge, 0.3) << "there is something to cross to";
     }
 }
 
@@ -341,7 +357,7 @@ TEST_F(AoGpu, BordersOfLevelsDoNotShow) {
         std::vector<Edit> edits{edit(Plane{})};
         const float r = 0.3f;
         if (with_ball) edits.push_back(edit(Sphere{.radius = r}, {0, r, 0}));
-        auto map = field::Clipmap::make(field::worlds::compiled(edits), {.voxel_size = 0.01f, .levels = 5, .cells = 32},
+        auto map = field::Clipmap::make(field::worlds::compiled(edits), {.voxel_size = 0.01f, .levels = 4, .cells = 32},
                                         {0.5, 0.1, 0.2});
         ASSERT_TRUE(map);
         map->work();
@@ -437,7 +453,7 @@ TEST_F(AoGpu, PicturesComeNearerToPaths) {
             if (i % 4 != 3) worst = std::max(worst, std::fabs(white.rgba[i] - 1));
         EXPECT_LE(worst, 0.01f) << "roughness " << roughness;
     }
-    for (const float grey : {0.2f, 0.8f}) {
+    for (const float grey : {0.7f}) {
         frame.materials.assign(2, Material{.base_color = {grey, grey, grey}, .roughness = 0.8f});
         const auto program = frame.field->program();
         const ReferenceField judge{.distance = [&](dvec3 p) { return sdf::evaluate(sdf::view(program), p); },
@@ -477,7 +493,7 @@ TEST_F(AoGpu, PixelsAreThoseOfTheJudge) {
                                .bounds = kEverywhere,
                                .meshes = &trace};
     const ReferencePicture truth = render_reference(judge, {}, shade::sky_params(frame), frame.camera,
-                                                    {.width = 64, .height = 48, .sky_samples = 144});
+                                                    {.width = 64, .height = 48, .sky_samples = 100});
     const Picture seen = open(frame, {.width = 64, .height = 48});
     frame.lights.clear();
     const Picture light = rhi::must(renderer->render(frame, {.width = 64, .height = 48}));

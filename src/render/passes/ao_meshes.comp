@@ -43,14 +43,7 @@ void main() {
     ivec2 pixel = ao_pixel(texel);
     vec3 normal = unpack_unit(point.y);
     ShadowStart start = shadow_start(texelFetch(visibility, pixel, 0), pixel_ray(pixel), normal);
-    MeshWalk wanted = MeshWalk(false, true, start.part, start.triangle, 0.0, start.outwards);
-    if (start.part != kNoPart) {
-        MeshPart part = mesh_parts[start.part];
-        vec3 a = mesh_point(part, vertex_position(mesh_corner(part, start.triangle, 0u)));
-        vec3 b = mesh_point(part, vertex_position(mesh_corner(part, start.triangle, 1u)));
-        vec3 c = mesh_point(part, vertex_position(mesh_corner(part, start.triangle, 2u)));
-        wanted.own_near = 1.5 * (length(b - a) + length(c - a));
-    }
+    MeshWalk wanted = MeshWalk(false, true, start.part, start.triangle);
     for (uint i = 0u; i < push.rays; ++i) {
         if ((point.x & (1u << i)) == 0u) continue;
         MeshWalkHit hit = walk_meshes(start.from, ao_direction(texel, i, normal), kFarMetres, wanted);

@@ -36,7 +36,7 @@ void main() {
     TexelRay ray = pixel_ray(pixel);
     float h = frame.grid.voxel_size;
     MeshWalkHit hit = walk_meshes(ray_origin(ray), ray.direction, min(uintBitsToFloat(seen.x) * h, kFarMetres),
-                                  MeshWalk(push.through != 0u, false, kNoTriangle, kNoTriangle, 0.0, vec3(0.0)));
+                                  MeshWalk(push.through != 0u, false, kNoTriangle, kNoTriangle));
     if (hit.triangle != kNoTriangle) seen = uvec4(floatBitsToUint(hit.t / h), (kSeenMesh << 28u) | hit.triangle, hit.part, seen.w);
     imageStore(visibility_now, pixel, seen);
 }

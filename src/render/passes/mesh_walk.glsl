@@ -13,11 +13,7 @@ struct MeshWalkHit {
 struct MeshWalk {
     bool through;  // parts that blend; else the solid ones
     bool any;      // the first that is met will do, whichever side of it; else the nearest whose front it is, or that has two
-    // Not met are a triangle of `own_part`, and others of it up to `own_near` that are turned from `outwards` by less than 45 degrees: facets of the round surface
-    // that a ray starts on. kNoTriangle: all are met.
-    uint own_part, own_triangle;
-    float own_near;
-    vec3 outwards;
+    uint own_part, own_triangle;  // not met; kNoTriangle: all are
 };
 
 bool meets(MeshNode box, vec3 from, vec3 inverse, float t_last) {
@@ -102,12 +98,10 @@ MeshWalkHit walk_meshes(vec3 from, vec3 d, float t_last, MeshWalk wanted) {
                     candidate = !(min(min(w.x, w.y), w.z) < 0.0 && max(max(w.x, w.y), w.z) > 0.0) && volume != 0.0;
                     w /= volume;
                     t = dot(w.x * a + w.y * b + w.z * c, v) / dot(v, v);
-                    candidate = candidate && t > 0.0 && t < hit.t;
+                    candidate = candidate && t > 0.0 && t < hit.t && !(which == wanted.own_part && triangle == wanted.own_triangle);
                     // Corners turn to the left as seen from the front, whether the part is mirrored or not.
                     vec3 face = cross(mesh_vector(part, b - a), mesh_vector(part, c - a));
                     candidate = candidate && (wanted.any || (part.flags & kMeshDoubleSided) != 0u || !(dot(face, d) > 0.0));
-                    if (which == wanted.own_part)
-                        candidate = candidate && triangle != wanted.own_triangle && !(t < wanted.own_near && abs(dot(face, wanted.outwards)) > 0.7 * length(face));
                     ++triangle;
                 }
             } while (in_part && !candidate);
