@@ -26,7 +26,7 @@ static float later_reaches(const sdf::Program& program, const sdf::IndexedEdit& 
     const float most = program.index.blend_allowance(edit.influence(far), far, edit.row);
     if (most == 0 || gone) return most;
     std::vector<uint32_t> rows;
-    program.index.find(edit.influence(far + most), far + most, rows);
+    program.index.find_blending(edit.influence(far + most), far + most, rows);
     sdf::BlendAllowance out;
     for (const uint32_t row : rows) {
         if (program.edits[row].order > program.edits[edit.row].order) out.add(program.edits[row].reach);
@@ -66,6 +66,25 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
                return in.has_material() &&
                       std::binary_search(rows.begin(), rows.end(), uint32_t(program.params[in.param + 2]));
            });
+}
+
+CellMaker::OwnRoom CellMaker::take_room() {
+    std::vector<Room*>& spare = spare_rooms().rooms;
+    if (spare.empty()) return OwnRoom(new Room);
+    OwnRoom out(spare.back());
+    spare.pop_back();
+    return out;
+}
+
+void CellMaker::GiveBack::operator()(Room* room) const { spare_rooms().rooms.push_back(room); }
+
+// A thread's.
+CellMaker::Rooms& CellMaker::spare_rooms() {
+    static thread_local Rooms all;
+    return all;
+}
+CellMaker::Rooms::~Rooms() {
+    for (Room* const room : rooms) delete room;
 }
 
 // Rows that reach the box of cells, in order.

@@ -12,6 +12,7 @@
 #include "sdf/rebase.h"
 
 #include <algorithm>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -63,7 +64,8 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 ///     void empty(ivec3 cell, bool inside)
 ///     bool keeps(ivec3 cell, Inserted, ListCuller::Start)    it is as it was
 /// and, of run_box() alone,
-///     uint64_t may_stay(const CellMaker&)         of the cells centres() are of, a bit each: those to ask the next about
+///     StillCells look(const CellMaker&)           of the cells centres() are of
+///     bool is_empty(ivec3 cell)                   as it was
 ///     bool texels_stay(ivec3 cell, CellMaker&)    it has a brick, with another code but the same texels, and has taken it
 ///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
 enum class Inserted : uint8_t {
@@ -71,8 +73,30 @@ enum class Inserted : uint8_t {
     Hidden,   ///< none is
     NoEffect  ///< with or without them the same is stored
 };
+/// Of 64 cells, a bit each.
+struct StillCells {
+    uint64_t empty = 0;  ///< stay so, if they are
+    uint64_t ask = 0;    ///< have a brick that may stay
+};
 
 class CellMaker {
+    // What is kept between makers of a thread, so that a small update need not ask for memory.
+    struct Room {
+        sdf::ListCuller::Fold groups, cells;
+        std::vector<uint32_t> rows;
+        std::vector<sdf::Instruction> code;
+    };
+    struct Rooms {
+        std::vector<Room*> rooms;
+        ~Rooms();
+    };
+    static Rooms& spare_rooms();
+    struct GiveBack {
+        void operator()(Room* room) const;
+    };
+    using OwnRoom = std::unique_ptr<Room, GiveBack>;
+    static OwnRoom take_room();
+
 public:
     CellMaker(const sdf::Program& program, const CellLattice& lattice, std::span<const uint32_t> inserted = {})
         : program_(&program),
@@ -107,7 +131,10 @@ public:
     ivec3 cell(int ball) const { return cell_[ball]; }
     /// Of the cell that a sink is asked about: makes its code.
     void emit_code() { culler_.emit(cells_, ball_, code_); }
-    std::optional<uint16_t> only_material() const { return culler_.only_material(cells_, ball_); }
+    std::optional<uint16_t> only_material() {
+        if (!only_material_) only_material_ = culler_.only_material(cells_, ball_);
+        return *only_material_;
+    }
     uint64_t cells_tested() const { return cells_tested_; }        ///< balls folded at any level of the hierarchy
     uint64_t cells_evaluated() const { return cells_evaluated_; }  ///< cells whose texels were looked at
 
@@ -134,12 +161,14 @@ private:
     std::span<const uint32_t> inserted_;
     float far_;
     sdf::ListCuller culler_;
-    sdf::ListCuller::Fold groups_, cells_;
+    OwnRoom room_ = take_room();
+    sdf::ListCuller::Fold &groups_ = room_->groups, &cells_ = room_->cells;
+    std::vector<uint32_t>& rows_ = room_->rows;
+    std::vector<sdf::Instruction>& code_ = room_->code;
     BrickEvaluator evaluator_;
-    std::vector<uint32_t> rows_;
-    std::vector<sdf::Instruction> code_;
-    ivec3 cell_[64];  // of the balls of cells_
-    int ball_ = 0;    // of the brick at hand
+    ivec3 cell_[64];                                        // of the balls of cells_
+    int ball_ = 0;                                          // of the brick at hand
+    std::optional<std::optional<uint16_t>> only_material_;  // of its cell, once asked for
     uint64_t cells_tested_ = 0, cells_evaluated_ = 0;
 };
 
@@ -246,18 +275,22 @@ void CellMaker::run_cells(Sink& sink) {
     culler_.keep(cells_, open);
     const uint64_t shown = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
     const uint64_t no_effect = kWholeList ? culler_.balls_unchanged_by(cells_, inserted_) : 0;
-    uint64_t may_stay = 0;
-    if constexpr (kWholeList) may_stay = open & sink.may_stay(*this);
+    StillCells still;
+    if constexpr (kWholeList) still = sink.look(*this);
     for (int i = 0; i < 64; ++i) {
         if ((open >> i & 1u) == 0) continue;
         const Inserted inserted = (no_effect >> i & 1u) != 0 ? Inserted::NoEffect
                                   : (shown >> i & 1u) != 0   ? Inserted::Shows
                                                              : Inserted::Hidden;
+        if constexpr (kWholeList) {
+            if ((still.empty >> i & 1u) != 0 && sink.is_empty(cell_[i])) continue;
+        }
         if (sink.keeps(cell_[i], inserted, culler_.start_of(cells_, i))) continue;
         if (sink.stop()) return;
         ball_ = i;
+        only_material_.reset();
         if constexpr (kWholeList) {
-            if ((may_stay >> i & 1u) != 0 && sink.texels_stay(cell_[i], *this)) continue;
+            if ((still.ask >> i & 1u) != 0 && sink.texels_stay(cell_[i], *this)) continue;
         }
         if (evaluate(cell_[i])) {
             sink.brick(cell_[i], *this);

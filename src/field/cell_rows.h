@@ -49,17 +49,18 @@ inline constexpr auto kSpread = [] {
 }();
 inline void spread(uint8_t bits, Eight& out) { std::memcpy(&out, kSpread[bits].data(), sizeof out); }
 
-/// Bit k is the highest bit of word k, of 8.
-inline uint32_t top_bits(const uint32_t* words) {
+/// Bit k is this bit of word k, of 8.
+inline uint32_t bits_of(const uint32_t* words, int bit) {
     uint32_t out = 0;
 #if defined(__SSE__)
     for (int half = 0; half < 2; ++half) {
-        float four __attribute__((vector_size(16)));
+        uint32_t four __attribute__((vector_size(16)));
         std::memcpy(&four, words + 4 * half, sizeof four);
-        out |= uint32_t(__builtin_ia32_movmskps(four)) << (4 * half);
+        using Floats __attribute__((vector_size(16))) = float;
+        out |= uint32_t(__builtin_ia32_movmskps(Floats(four << (31 - bit)))) << (4 * half);
     }
 #else
-    for (int k = 0; k < kCellPage; ++k) out |= (words[k] >> 31) << k;
+    for (int k = 0; k < kCellPage; ++k) out |= (words[k] >> bit & 1u) << k;
 #endif
     return out;
 }

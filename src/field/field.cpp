@@ -30,6 +30,7 @@ constexpr int kTaskPages = kBlockCells / kCellPage;
 constexpr int64_t kMaxCells = 1ll << 28;
 constexpr int64_t kMaxTexel = 1ll << 24;  // float holds every integer up to here
 constexpr int64_t kFewCells = 4096;       // an update of fewer takes them as they come
+constexpr size_t kFewLeaves = 64;         // and asks for room for so many bricks at first
 
 std::atomic<uint64_t> revisions{0};
 
@@ -86,9 +87,11 @@ public:
             } else if (cells > 0) {
                 results_.resize(dirty_.size());
                 CellMaker maker = this->maker();
-                StillTexels still(*program_, options_.voxel_size, reached_);
+                StillTexels still(*program_, lattice(), reached_);
                 for (size_t i = 0; i < dirty_.size(); ++i) {
                     TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i), {}, was_reached_, &still, false};
+                    results_[i].leaves.reserve(kFewLeaves);
+                    results_[i].code.reserve(kFewLeaves * 16);
                     maker.run_box(dirty_[i], sink);
                 }
                 count(maker, results_[0]);
@@ -157,17 +160,19 @@ private:
             const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
             return (word & kCellOccupied) != 0 ? &(*builder.stored_)[word & kCellSlotMask] : nullptr;
         }
-        uint64_t may_stay(const CellMaker& maker) {
-            if (builder.stored_ == nullptr) return 0;
+        bool is_empty(ivec3 cell) const {
+            return (builder.old_->cells_.at(cell.x, cell.y, cell.z) & kCellOccupied) == 0;
+        }
+        StillCells look(const CellMaker& maker) {
             if (!saw_rows) still->see(maker.rows());
             saw_rows = true;
-            const uint64_t likely = still->likely(maker.centres(), maker.values());
-            uint64_t out = 0;
-            for (uint64_t left = likely & maker.centres().live; left != 0; left &= left - 1) {
+            StillCells out = still->look(maker.centres(), maker.values());
+            uint64_t left = builder.stored_ != nullptr ? out.ask & maker.centres().live : 0;
+            for (out.ask = 0; left != 0; left &= left - 1) {
                 const int ball = std::countr_zero(left);
                 const BrickContent* const brick = stored(maker.cell(ball));
                 if (brick == nullptr || !brick->half) continue;
-                out |= left & -left;
+                out.ask |= left & -left;
                 // Codes come from far away: all are asked for before the first is looked at.
                 const auto* const codes = reinterpret_cast<const std::byte*>(brick->half->codes.data());
                 for (size_t at = 0; at < sizeof brick->half->codes; at += 64) __builtin_prefetch(codes + at);

@@ -95,6 +95,11 @@ Result<void> HostBricks::update(std::shared_ptr<const sdf::Program> program, std
 void HostBricks::take(MadeBricks& made) {
     tables_ = WideTables::after(tables_, made);
     contents_.resize_pages(field_->slot_count() / BrickContents::kPageSize + 1);
+    // Holders of what shares a page are counted when it is copied; all counters are asked for before the first is.
+    for (const auto& [slot, content] : made) {
+        if (const BrickContents::Page* const page = contents_.find(slot / BrickContents::kPageSize))
+            std::ranges::for_each(*page, &BrickContent::prefetch);
+    }
     for (auto& [slot, content] : made) contents_.write(slot) = std::move(content);
 }
 

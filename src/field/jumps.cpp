@@ -125,7 +125,7 @@ void update_jumps(CellMap& cells, const CellBox& box) {
         for (int z = part.min.z; z < part.max.z; ++z) {
             for (int y = part.min.y; y < part.max.y; ++y) {
                 near.row(y - wide.min.y, z - wide.min.z)[size_t(x8) / 8] |=
-                    uint64_t(top_bits(words->data() + row_of(y, z))) << (x8 % 8 * 8);
+                    uint64_t(bits_of(words->data() + row_of(y, z), 31)) << (x8 % 8 * 8);
             }
         }
     });
@@ -168,68 +168,239 @@ void update_jumps(CellMap& cells, const CellBox& box) {
     });
 }
 
+namespace {
+
 // Jumps differ by at most one between neighbours. So a cell whose jump becomes k because of a new brick lies beside one whose jump becomes
 // k - 1, and so on down to that brick; and where a jump was k because of a brick that is gone, the same holds of what was. Either way the
-// wave of cells that change starts there, and is followed no further than it reaches, which in a crowd is a cell or two.
-// Asks changes(cell, k) of the cells k steps from `from`, of those that lie beside one that it said yes of, or of `from`.
-template <typename Fn>
-static void follow(ivec3 size_of_grid, std::span<const ivec3> from, Fn&& changes) {
-    CellBox all{};
-    for (const ivec3 c : from) all = joined(all, {c, c + ivec3{1, 1, 1}});
-    if (all.empty()) return;
-    CellBox box = grown(all, kReach, size_of_grid);
-    box.min.x &= ~(kCellPage - 1);
-    const ivec3 size = box.max - box.min;
-    BitBox front(size), near(size), by_x(size), by_y(size), seen(size);
-    for (const ivec3 c : from) {
-        const ivec3 at = c - box.min;
-        const uint64_t bit = uint64_t(1) << (at.x % 64);
-        front.row(at.y, at.z)[at.x / 64] |= bit;
-        seen.row(at.y, at.z)[at.x / 64] |= bit;
+// wave of cells that change starts there, and is followed no further than it reaches, which in a crowd is a cell or two: a window
+// that shows so far is tried first, and one more cell where jumps rise, which is told by what lies around.
+constexpr int kFewCells = 2, kAllCells = kReach + 1;
+
+// The jumps around some cells, a bit a cell and a word a row. Beyond the window's sides lie rows of nothing.
+class Window {
+public:
+    // Of at most 64 cells along x.
+    static bool fits(const CellMap& cells, const CellBox& around, int reach) {
+        const CellBox box = box_of(cells, around, reach);
+        return box.max.x - box.min.x <= 64;
     }
-    bool any = true;
-    for (uint32_t k = 1; k <= uint32_t(kReach) && any; ++k) {
-        const CellBox wave = grown({all.min - box.min, all.max - box.min}, int(k), size);
-        dilate(front, by_x, by_y, near, {wave.min.y, wave.max.y, wave.min.z, wave.max.z});
-        any = false;
-        for (int z = wave.min.z; z < wave.max.z; ++z) {
-            for (int y = wave.min.y; y < wave.max.y; ++y) {
-                for (size_t w = 0; w < near.row_words; ++w) {
-                    uint64_t asked = near.row(y, z)[w] & ~seen.row(y, z)[w], yes = 0;
-                    seen.row(y, z)[w] |= asked;
-                    for (; asked != 0; asked &= asked - 1) {
-                        const int bit = std::countr_zero(asked);
-                        const ivec3 cell = box.min + ivec3{int(w) * 64 + bit, y, z};
-                        if (cell.x >= box.max.x) break;
-                        if (changes(cell, k)) yes |= uint64_t(1) << bit;
+    Window(CellMap& cells, const CellBox& around, int reach, std::vector<uint64_t>& words)
+        : cells_(cells),
+          box_(box_of(cells, around, reach)),
+          size_(box_.max - box_.min),
+          around_(around),
+          reach_(reach),
+          words_(words) {
+        const size_t rows = size_t(size_.y + 2) * size_t(size_.z + 2);
+        words_.assign(kPlanes * rows, 0);
+        for (size_t i = 0; i < kPlanes; ++i) plane_[i] = words_.data() + i * rows;
+        load();
+    }
+
+    // The cells are occupied now. Whether the window shows all that changes by it; only then it is done.
+    bool lower(std::span<const ivec3> occupied) {
+        mark(occupied);
+        const bool whole = follow([&](size_t row, uint32_t k) { return above(row, k); },
+                                  [&](size_t row, uint32_t k, uint64_t cells) { give(row, cells, k); });
+        if (whole) write();
+        return whole;
+    }
+    // The same of cells that are empty now.
+    bool raise(std::span<const ivec3> emptied) {
+        mark(emptied);
+        if (!follow([&](size_t row, uint32_t k) { return equal(row, k); }, [](size_t, uint32_t, uint64_t) {}))
+            return false;
+        // What the wave met is told by what is around it: one more than the least jump beside it.
+        std::copy_n(plane_[kOccupied], words_.size() / kPlanes, plane_[kFront]);
+        for (uint32_t k = 1; k <= uint32_t(kMaxJump); ++k) {
+            const Rows rows = rows_of(reached_);
+            if (k < uint32_t(kMaxJump)) dilate(rows);
+            uint64_t left = 0;
+            each_row(rows, [&](size_t row) {
+                const uint64_t open = plane_[kSeen][row] & ~plane_[kGiven][row];
+                const uint64_t near = k < uint32_t(kMaxJump) ? open & plane_[kNear][row] : open;
+                give(row, near, k);
+                left |= open & ~near;
+            });
+            if (left == 0) break;
+            each_row(rows_of(reached_ + 1), [&](size_t row) {
+                plane_[kFront][row] |= plane_[kGiven][row] | (equal(row, k) & ~plane_[kSeen][row]);
+            });
+        }
+        write();
+        return true;
+    }
+
+private:
+    // Jumps are three bits, those that were and those that will be; of occupied cells they are 0.
+    enum Plane {
+        kOccupied,
+        kJump,
+        kNew = kJump + 3,
+        kGiven = kNew + 3,
+        kSeen,
+        kFront,
+        kNear,
+        kAlong,
+        kAcross,
+        kPlanes
+    };
+
+    static CellBox box_of(const CellMap& cells, const CellBox& around, int reach) {
+        CellBox box = grown(around, reach, cells.size());
+        box.min.x &= ~(kCellPage - 1);
+        return box;
+    }
+    size_t row_at(int y, int z) const { return size_t(z + 1) * size_t(size_.y + 2) + size_t(y + 1); }
+    Rows rows_of(int by) const {
+        const CellBox rows = grown({around_.min - box_.min, around_.max - box_.min}, by, size_);
+        return {rows.min.y, rows.max.y, rows.min.z, rows.max.z};
+    }
+    template <typename Fn>
+    void each_row(const Rows& rows, Fn&& fn) const {
+        for (int z = rows.z0; z < rows.z1; ++z) {
+            for (size_t row = row_at(rows.y0, z), last = row_at(rows.y1, z); row < last; ++row) fn(row);
+        }
+    }
+
+    void load() {
+        each_page(cells_, box_, [&](size_t page, const CellBox& part) {
+            const CellMap::Words::Page* const words = cells_.words().find(page);
+            const int x8 = (part.min.x - box_.min.x) & ~(kCellPage - 1);
+            const uint64_t ours = (~uint64_t(0) >> (64 - (part.max.x - part.min.x))) << (part.min.x - box_.min.x);
+            for (int z = part.min.z; z < part.max.z; ++z) {
+                for (int y = part.min.y; y < part.max.y; ++y) {
+                    const size_t row = row_at(y - box_.min.y, z - box_.min.z);
+                    if (words == nullptr) {
+                        for (size_t i = kJump; i < kJump + 3; ++i) plane_[i][row] |= ours;
+                        continue;
                     }
-                    front.row(y, z)[w] = yes;
-                    any = any || yes != 0;
+                    const uint32_t* const from = words->data() + row_of(y, z);
+                    const uint32_t occupied = bits_of(from, 31);
+                    plane_[kOccupied][row] |= uint64_t(occupied) << x8 & ours;
+                    for (int i = 0; i < 3; ++i)
+                        plane_[size_t(kJump + i)][row] |= uint64_t(bits_of(from, i) & ~occupied) << x8 & ours;
+                }
+            }
+        });
+    }
+    void mark(std::span<const ivec3> from) {
+        for (const ivec3 c : from) {
+            const ivec3 at = c - box_.min;
+            const size_t row = row_at(at.y, at.z);
+            plane_[kFront][row] |= uint64_t(1) << at.x;
+            plane_[kSeen][row] |= uint64_t(1) << at.x;
+        }
+    }
+
+    // The cells whose jump is k, or more.
+    uint64_t equal(size_t row, uint32_t k) const {
+        uint64_t out = ~uint64_t(0);
+        for (size_t i = 0; i < 3; ++i) out &= (k >> i & 1u) != 0 ? plane_[kJump + i][row] : ~plane_[kJump + i][row];
+        return out;
+    }
+    uint64_t above(size_t row, uint32_t k) const {
+        uint64_t out = 0, even = ~uint64_t(0);  // from the highest bit down: above, and equal so far
+        for (size_t i = 3; i-- > 0;) {
+            const uint64_t bit = plane_[kJump + i][row];
+            if ((k >> i & 1u) == 0) out |= even & bit;
+            even &= (k >> i & 1u) != 0 ? bit : ~bit;
+        }
+        return out;
+    }
+    void give(size_t row, uint64_t cells, uint32_t k) {
+        plane_[kGiven][row] |= cells;
+        for (size_t i = 0; i < 3; ++i) plane_[kNew + i][row] |= (k >> i & 1u) != 0 ? cells : 0;
+    }
+
+    // Asks changes(row, k) for the cells k steps from the marked ones, of those beside one that it said yes of, and takes them.
+    template <typename Changes, typename Take>
+    bool follow(Changes&& changes, Take&& take) {
+        uint64_t any = 1;
+        reached_ = 0;
+        for (uint32_t k = 1; k <= uint32_t(kReach) && any != 0; ++k) {
+            const Rows rows = rows_of(int(k));
+            dilate(rows);
+            any = 0;
+            each_row(rows, [&](size_t row) {
+                const uint64_t yes = plane_[kNear][row] & ~plane_[kSeen][row] & changes(row, k);
+                plane_[kFront][row] = yes;
+                plane_[kSeen][row] |= yes;
+                take(row, k, yes);
+                any |= yes;
+            });
+            if (any == 0) break;
+            reached_ = int(k);
+            if (reached_ == reach_) return false;
+        }
+        return true;
+    }
+    // The front dilated by one cell, in these rows.
+    void dilate(const Rows& rows) {
+        for (int z = rows.z0 - 1; z <= rows.z1; ++z) {
+            const uint64_t* const front = plane_[kFront];
+            uint64_t *const along = plane_[kAlong], *const across = plane_[kAcross];
+            const size_t first = row_at(rows.y0, z), last = row_at(rows.y1, z);
+            for (size_t row = first - 1; row <= last; ++row)
+                along[row] = front[row] | front[row] << 1 | front[row] >> 1;
+            for (size_t row = first; row < last; ++row) across[row] = along[row - 1] | along[row] | along[row + 1];
+        }
+        const size_t plane = size_t(size_.y + 2);
+        each_row(rows, [&](size_t row) {
+            plane_[kNear][row] = plane_[kAcross][row - plane] | plane_[kAcross][row] | plane_[kAcross][row + plane];
+        });
+    }
+
+    void write() {
+        const Rows rows = rows_of(reached_);
+        for (int z = rows.z0; z < rows.z1; ++z) {
+            for (int y = rows.y0; y < rows.y1; ++y) {
+                const size_t row = row_at(y, z);
+                uint64_t other = 0;
+                for (size_t i = 0; i < 3; ++i) other |= plane_[kJump + i][row] ^ plane_[kNew + i][row];
+                for (uint64_t left = other & plane_[kGiven][row]; left != 0; left &= left - 1) {
+                    const int x = std::countr_zero(left);
+                    uint32_t jump = 0;
+                    for (size_t i = 0; i < 3; ++i) jump |= uint32_t(plane_[kNew + i][row] >> x & 1u) << i;
+                    const ivec3 c = box_.min + ivec3{x, y, z};
+                    cells_.set(c.x, c.y, c.z, (cells_.at(c.x, c.y, c.z) & kCellInside) | jump);
                 }
             }
         }
     }
+
+    CellMap& cells_;
+    const CellBox box_;
+    const ivec3 size_;
+    const CellBox around_;
+    const int reach_;
+    int reached_ = 0;
+    std::vector<uint64_t>& words_;
+    uint64_t* plane_[kPlanes];
+};
+
+template <typename Change>
+void change(CellMap& cells, std::span<const ivec3> of, int few, Change&& in_window) {
+    CellBox all{};
+    for (const ivec3 c : of) all = joined(all, {c, c + ivec3{1, 1, 1}});
+    if (all.empty()) return;
+    for (const int reach : {few, kAllCells}) {
+        if (!Window::fits(cells, all, reach)) break;
+        static thread_local std::vector<uint64_t> words;
+        Window window(cells, all, reach, words);
+        if (in_window(window)) return;
+    }
+    update_jumps(cells, grown(all, kReach, cells.size()));
 }
 
+}  // namespace
+
 void lower_jumps(CellMap& cells, std::span<const ivec3> occupied) {
-    follow(cells.size(), occupied, [&](ivec3 c, uint32_t k) {
-        const uint32_t word = cells.at(c.x, c.y, c.z);
-        if ((word & kCellOccupied) != 0 || (word & uint32_t(kMaxJump)) <= k) return false;
-        cells.set(c.x, c.y, c.z, (word & kCellInside) | k);
-        return true;
-    });
+    change(cells, occupied, kFewCells, [&](Window& window) { return window.lower(occupied); });
 }
 
 void raise_jumps(CellMap& cells, std::span<const ivec3> emptied) {
-    CellBox changed{};
-    for (const ivec3 c : emptied) changed = joined(changed, {c, c + ivec3{1, 1, 1}});
-    follow(cells.size(), emptied, [&](ivec3 c, uint32_t k) {
-        const uint32_t word = cells.at(c.x, c.y, c.z);
-        if ((word & kCellOccupied) != 0 || (word & uint32_t(kMaxJump)) != k) return false;
-        changed = joined(changed, {c, c + ivec3{1, 1, 1}});
-        return true;
-    });
-    update_jumps(cells, changed);
+    change(cells, emptied, kFewCells + 1, [&](Window& window) { return window.raise(emptied); });
 }
 
 }  // namespace kiln::field

@@ -104,7 +104,7 @@ private:
                     uint32_t lanes[8];
                     std::memcpy(lanes, &same, sizeof lanes);
                     out[size_t((z - wide.min.z) * (height_ + 2) + (y - wide.min.y))][size_t(x) / 64] |=
-                        uint64_t(top_bits(lanes)) << (x % 64);
+                        uint64_t(bits_of(lanes, 31)) << (x % 64);
                 }
             }
         });

@@ -16,8 +16,12 @@ constexpr float kGuardVoxels = 2;
 
 }  // namespace
 
-StillTexels::StillTexels(const sdf::Program& program, float voxel_size, std::vector<Change> changes)
-    : program_(&program), voxel_size_(voxel_size), changes_(std::move(changes)) {
+StillTexels::StillTexels(const sdf::Program& program, const CellLattice& lattice, std::vector<Change> changes)
+    : program_(&program),
+      voxel_size_(lattice.voxel_size),
+      own_voxels_(lattice.own_voxels),
+      farthest_(lattice.farthest),
+      changes_(std::move(changes)) {
     for (const Change& change : changes_) {
         const sdf::EditSpan& edit = program.edits[change.row];
         const std::span<const sdf::Instruction> code = program.code.subspan(edit.first, edit.count - 1);
@@ -28,24 +32,27 @@ StillTexels::StillTexels(const sdf::Program& program, float voxel_size, std::vec
     code_first_.push_back(code_.size());
 }
 
-uint64_t StillTexels::likely(const sdf::Balls& centres, const float* values) const {
-    uint64_t out = ~uint64_t(0);
+StillCells StillTexels::look(const sdf::Balls& centres, const float* values) const {
+    StillCells out{~uint64_t(0), ~uint64_t(0)};
     alignas(64) float edit[64];
     const float voxels = 1 / voxel_size_;
     for (size_t i = 0; i < changes_.size(); ++i) {
-        if (margins_[i] == kInfinite) return 0;
+        if (margins_[i] == kInfinite) return {};
         const std::span<const sdf::Instruction> code =
             std::span(code_).subspan(code_first_[i], code_first_[i + 1] - code_first_[i]);
         sdf::evaluate(sdf::view(*program_, code), {centres.x, centres.y, centres.z, 64}, edit);
         const float sign = program_->edits[changes_[i].row].op == Op::Union ? 1.0f : -1.0f;
         const float floor = changes_[i].gone ? -kInfinite : -kBandVoxels, above = margins_[i] + kGuardVoxels;
-        uint64_t away = 0;
+        const float beyond = (own_voxels_ + margins_[i]) * voxel_size_ + centres.radius;
+        uint64_t away = 0, empty = 0;
         for (uint64_t left = centres.live; left != 0; left &= left - 1) {
             const int ball = std::countr_zero(left);
             const float world = sign * values[ball] * voxels;
             away |= edit[ball] * voxels > world + above || world < floor ? left & -left : 0;
+            empty |= edit[ball] > beyond + sdf::kPruneUlps * (farthest_ + edit[ball]) ? left & -left : 0;
         }
-        out &= away;
+        out.ask &= away;
+        out.empty &= empty;
     }
     return out;
 }

@@ -6,6 +6,9 @@
 // one value there with it and without it: the proof beside EditIndex::blend_allowance(), for T = w, has both worlds above T or equal, and one of
 // them is w. (Where w is cut off at the band, both are beyond it or equal.) For a cut all of this is upside down. And where a texel is at
 // the far end inside, no union that comes can change it: worlds grow with what they are made of, and so do their ends.
+// For T = o, what a cell must come nearer than to own a brick, the same says that an empty cell throughout which the edit's value is above o + k + S
+// stays as it is. Outside, the world is above T with it and without, or has one value; inside, where the world is below -o, it is not above T, so it
+// has one value. For a cut, turned round, inside is above and outside one value.
 #pragma once
 
 #include "field/brick_content.h"
@@ -24,19 +27,19 @@ public:
         bool gone;
         CellBox reached;  ///< cells in which it may change what is stored
     };
-    StillTexels(const sdf::Program& program, float voxel_size, std::vector<Change> changes);
+    StillTexels(const sdf::Program& program, const CellLattice& lattice, std::vector<Change> changes);
 
     /// What is asked next is about cells that these rows reach, of the program as it is now.
     void see(std::span<const uint32_t> rows);
-    /// Which of 64 cells to ask about, from the program's values at their centres: a guess that keeps the price of asking in vain low.
-    uint64_t likely(const sdf::Balls& centres, const float* values) const;
+    /// Of 64 cells, from the program's values at their centres. Which to ask about is a guess that keeps the price of asking in vain low.
+    StillCells look(const sdf::Balls& centres, const float* values) const;
     /// Whether the brick of a cell holds after all changes what it held before. `only`: the one material of all that the cell's new code has.
     bool hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, std::optional<uint16_t> only,
               BrickEvaluator& evaluator) const;
 
 private:
     const sdf::Program* program_;
-    float voxel_size_;
+    float voxel_size_, own_voxels_, farthest_;
     std::vector<Change> changes_;
     std::vector<sdf::Instruction> code_;  // of all changes: each edit's value moved to R0
     std::vector<size_t> code_first_;

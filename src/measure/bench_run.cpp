@@ -16,8 +16,8 @@ using namespace measure;
 namespace {
 
 const std::vector<BenchFamily>& families() {
-    static const std::vector<BenchFamily> all{field_family(),   expression_family(), world_family(),
-                                              physics_family(), journal_family(),    frame_family()};
+    static const std::vector<BenchFamily> all{field_family(),   edits_family(),   expression_family(), world_family(),
+                                              physics_family(), journal_family(), frame_family()};
     return all;
 }
 

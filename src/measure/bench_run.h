@@ -57,6 +57,7 @@ struct BenchFamily {
     BenchInfo info;
     void (*run)(BenchRun&);
 };
+BenchFamily edits_family();
 BenchFamily expression_family();
 BenchFamily field_family();
 BenchFamily frame_family();

@@ -38,6 +38,7 @@ std::span<const Instruction> ListCuller::code_of(const Entry& entry) const {
 
 ListCuller::List ListCuller::list_of(std::span<const uint32_t> rows) {
     List out{entries_.size(), rows.size(), code_.size(), true};
+    entries_.reserve(entries_.size() + rows.size());
     for (const uint32_t row : rows) {
         const EditSpan& span = program_->edits[row];
         const uint32_t count = span.count - 1;

@@ -174,6 +174,14 @@ void EditIndex::find(const Box3& box, float value, float per_reach, std::vector<
         box, value, per_reach, [](const Node&) { return true; }, [&](const IndexedEdit& e) { rows.push_back(e.row); });
 }
 
+void EditIndex::find_blending(const Box3& box, float value, std::vector<uint32_t>& rows) const {
+    each(
+        box, value, 0, [](const Node& node) { return node.reach > 0; },
+        [&](const IndexedEdit& e) {
+            if (e.reach > 0) rows.push_back(e.row);
+        });
+}
+
 // A world is a left fold. Say that a result need not be known where it is above T (below -T: likewise, upside down). Then an operand of an
 // operation with reach k, and what came before it, need not be known where they are above T + k + S, S being the reaches that come later.
 // Proof, backwards: let two states of the running value, at a point, both be above T + S'. If the next edit is a union (reach k, S' = k + S)

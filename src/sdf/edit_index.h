@@ -50,6 +50,8 @@ public:
 
     /// Appends the rows of all edits whose influence(value) meets the box, and all that are everywhere; in no order.
     void find(const Box3& box, float value, std::vector<uint32_t>& rows) const { find(box, value, 0, rows); }
+    /// The same of those that blend.
+    void find_blending(const Box3& box, float value, std::vector<uint32_t>& rows) const;
     /// How much farther than `value` one must look for edits around the box, since smooth blends lead values from one to the next: see
     /// edit_index.cpp. Leaves out one row. 0 where nothing blends.
     float blend_allowance(const Box3& box, float value, uint32_t without = UINT32_MAX) const;

@@ -111,15 +111,16 @@ struct JoinSmooth {
     KILN_SDF real join(real a, real d, param k) { return op_distance(kOp, a, d, k); }
 };
 
-template <uint32_t kShape, typename Join>
+// kScaled: the shape's values are times something else than 1.
+template <uint32_t kShape, typename Join, bool kScaled>
 static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, BrickValues& values, const float* t, const float* w, float k) {
     const param tx = param(t[0]), ty = param(t[1]), tz = param(t[2]), scale = param(w[0]);
     for (int i = 0; i < kSliceVectors; ++i) {
         const real x = points.x[i] - tx, y = points.y[i] - ty;
         for (int slice = 0; slice < kBrickSlices; ++slice) {
             const real3 p(x, y, real(points.z[slice] - tz));
-            const real d = shape_distance(kShape, p, w + 3, Samples{nullptr}) * scale;
-            values.v[slice][i] = Join::join(values.v[slice][i], d, param(k));
+            const real d = shape_distance(kShape, p, w + 3, Samples{nullptr});
+            values.v[slice][i] = Join::join(values.v[slice][i], kScaled ? d * scale : d, param(k));
         }
     }
 }
@@ -127,15 +128,15 @@ static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, Bric
 using BrickLeaf = void (*)(const BrickPoints&, BrickValues&, const float*, const float*, float);
 
 // By shape (those worth their machine code), then by join.
-template <uint32_t kShape>
+template <uint32_t kShape, bool kScaled>
 static BrickLeaf leaf_of(int join) {
     switch (join) {
-        case 0: return &brick_leaf<kShape, JoinUnion>;
-        case 1: return &brick_leaf<kShape, JoinSubtract>;
-        case 2: return &brick_leaf<kShape, JoinSmooth<0>>;
-        case 3: return &brick_leaf<kShape, JoinSmooth<1>>;
-        case 4: return &brick_leaf<kShape, JoinSet>;
-        default: return &brick_leaf<kShape, JoinNegated>;
+        case 0: return &brick_leaf<kShape, JoinUnion, kScaled>;
+        case 1: return &brick_leaf<kShape, JoinSubtract, kScaled>;
+        case 2: return &brick_leaf<kShape, JoinSmooth<0>, kScaled>;
+        case 3: return &brick_leaf<kShape, JoinSmooth<1>, kScaled>;
+        case 4: return &brick_leaf<kShape, JoinSet, kScaled>;
+        default: return &brick_leaf<kShape, JoinNegated, kScaled>;
     }
 }
 
@@ -166,9 +167,10 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
         how = aux == 1u ? 5 : 4;
     }
     if (how < 0) return nullptr;
+    const bool scaled = params[code[3]] != 1;
     switch ((code[2] >> 5) & 255u) {
-        case kFusedSphere: return leaf_of<kFusedSphere>(how);
-        case kFusedBox: return leaf_of<kFusedBox>(how);
+        case kFusedSphere: return scaled ? leaf_of<kFusedSphere, true>(how) : leaf_of<kFusedSphere, false>(how);
+        case kFusedBox: return scaled ? leaf_of<kFusedBox, true>(how) : leaf_of<kFusedBox, false>(how);
         default: return nullptr;
     }
 }
@@ -268,7 +270,26 @@ static inline uint32_t all_words(uint32_t w) { return w; }
 static inline uint32_t load_words(const uint16_t* from) { return *from; }
 #endif
 
-// See store_halves() in sdf/eval.h. Integer arithmetic, to nearest, ties to even.
+// See store_halves() in sdf/eval.h. To nearest, ties to even: by the processor's own conversion where it has one, else integer arithmetic.
+#ifdef KILN_HALVES
+void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes, uint64_t* solid) {
+    const real zero = real(param(0));
+    for (size_t slice = 0; slice < count / 64; ++slice) {
+        uint64_t bits = 0;  // kept apart from memory: each vector's are joined to those before
+        for (size_t at = 0; at < 64; at += size_t(kBrickLanes)) {
+            const size_t i = 64 * slice + at;
+            const real v = load(values + i) * param(scale);
+            bits |= uint64_t(lane_bits(le(v, zero))) << at;
+            // NaN is the limit: of two operands the processor takes the second then, which is select()'s way too.
+            const real size = abs(v), inner = select(lt(size, real(param(limit))), size, real(param(limit)));
+            const real off = max(inner, real(param(least)));
+            const lane_u sign = lane_u(lt(v, zero).v) & all_words(0x80000000u), some = ~lane_u(le(size, zero).v);
+            store_half_words(codes + i, lane_f((lane_u(off.v) | sign) & some));
+        }
+        solid[slice] = bits;
+    }
+}
+#else
 void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes, uint64_t* solid) {
     const real zero = real(param(0));
     const auto rounded = [](real size) {
@@ -291,6 +312,7 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
         solid[slice] = bits;
     }
 }
+#endif
 
 // Values of store_halves()'s bits, but for 0, which is 2^-15.
 static inline real half_values(const uint16_t* codes) {

@@ -86,5 +86,25 @@ TEST(StillTexels, HollowsUnderASurfaceAreWhatARebuildHas) {
     }
 }
 
+// Between two balls that blend so widely that cells far from both become solid.
+TEST(StillTexels, EmptyCellsThatABlendFillsAreNotPassedOver) {
+    worlds::World world{"bridge", {}, {.voxel_size = 0.03f, .bounds = {{-0.9f, -0.5f, -0.5f}, {0.9f, 0.5f, 0.5f}}}};
+    world.edits.push_back(worlds::edit(Sphere{.radius = 0.3f}, {-0.55f, 0, 0}));
+    worlds::Live live(world.edits);
+    HostBricks host = *HostBricks::build(live.program(), world.options);
+    for (int step = 0; step < 24; ++step) {
+        std::vector<Edit>& edits = world.edits;
+        if (edits.size() > 1) {
+            edits.pop_back();
+        } else {
+            edits.push_back(worlds::edit(Sphere{.radius = 0.3f},
+                                         {0.45f + 0.015f * float(step / 2), 0.01f * float(step), 0}, Op::Union, 0.9f));
+        }
+        const std::vector<RowChange> changes = live.become(edits);
+        ASSERT_TRUE(host.update(live.program(), changes));
+        ASSERT_EQ(host.hash(), HostBricks::bake(world.field()).hash()) << "step " << step;
+    }
+}
+
 }  // namespace
 }  // namespace kiln::field
