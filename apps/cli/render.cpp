@@ -14,8 +14,7 @@ void add_render(CLI::App& app, Run& run) {
     CLI::App* verb = app.add_subcommand("render",
                                         "Draws one picture of a scene.\n\n"
                                         "Examples:\n"
-                                        "  kiln render potter -o depth.exr --view depth --size 640x480\n"
-                                        "  kiln render archipelago -o fly.png --path all --frames 240");
+                                        "  kiln render archipelago -o fly.png --size 640x480 --path all --frames 240");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
     verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
@@ -54,9 +53,7 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_option("--scale", o->scale,
                      "with --taa: rays a pixel along each side, 0.25 to 1; the picture is made whole over time")
         ->capture_default_str();
-    verb->add_option("--ao", o->ao,
-                     "ambient occlusion: off, half (rays of one pixel in four) or full; left out: what --quality says, "
-                     "else full");
+    verb->add_option("--ao", o->ao, "ambient occlusion: off, half or full");
     verb->add_option("--lighting", o->lighting,
                      "of lamps and spots: clusters (lists by tile), or volumes (rasterised and added up): the same "
                      "picture")

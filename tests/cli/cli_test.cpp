@@ -545,7 +545,7 @@ TEST_F(CliGpu, AMeshThatCannotBeReadIsToldAndTheRestIsDrawn) {
                 HasSubstr("\"mesh_clusters\": {\"in_sight\": 1, \"early\": 0, \"late\": 1, \"culled_percent\": 0}"));
     const Outcome ao = run("render m.kiln.json -o a.png --ao haft");
     EXPECT_EQ(ao.code, 2);
-    EXPECT_THAT(ao.err, HasSubstr("--ao haft: there is no such ambient occlusion; did you mean half?"));
+    EXPECT_THAT(ao.err, HasSubstr("--ao haft: there is no such ambient occlusion; use off, half or full"));
     for (const std::string how : {"--ao off", "--ao half", "--ao full --view ao", "--quality low --ao half"})
         EXPECT_EQ(run("render m.kiln.json -o a.png --size 16x16 -q " + how).code, 0) << how;
     const Outcome many = run("render m.kiln.json -o a.png --transparent-layers 17");
