@@ -14,8 +14,7 @@ void add_render(CLI::App& app, Run& run) {
     CLI::App* verb = app.add_subcommand("render",
                                         "Draws one picture of a scene.\n\n"
                                         "Examples:\n"
-                                        "  kiln render potter -o depth.exr --view depth --size 640x480\n"
-                                        "  kiln render archipelago -o fly.png --path all --frames 240");
+                                        "  kiln render archipelago -o fly.png --size 640x480 --path all --frames 240");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
     verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
