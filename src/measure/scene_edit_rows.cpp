@@ -153,7 +153,8 @@ const std::vector<std::string>& row_names() {
 }  // namespace
 
 BenchFamily edits_family() {
-    return {{"edits", "an edit at the surface of bundled scenes, while a picture holds what was before",
+    return {{"edits",
+             "an edit at the surface of bundled scenes, while a picture holds what was before",
              {row_names().begin(), row_names().end()}},
             [](BenchRun& run) {
                 for (const std::string scene : kScenes) {
