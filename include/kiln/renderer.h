@@ -191,7 +191,7 @@ struct RenderSettings {
 };
 
 /// What a picture may cost. Low: hard shadows, of meshes by maps; two things of glass behind one another, which throw no light back inside; surfaces as the
-/// bricks have them; no ambient occlusion. Medium: the same shadows and glass, ambient occlusion at half size. High: everything that one picture can show. Ultra:
+/// bricks have them; no ambient occlusion. Medium: the same, but surfaces as the exact program has them. High: everything that one picture can show. Ultra:
 /// anti-aliased over time too.
 enum class Quality : uint8_t { Low, Medium, High, Ultra };
 /// Sets `refine`, `soft_shadows`, `mesh_shadows`, `transparent_layers`, `glass_bounces`, `ao` and `taa`, no more.

@@ -325,9 +325,7 @@ void set_quality(RenderSettings& settings, Quality quality) {
     settings.mesh_shadows = quality >= Quality::High ? MeshShadows::Rays : MeshShadows::Cascades;
     settings.transparent_layers = quality >= Quality::High ? RenderSettings().transparent_layers : 2;
     settings.glass_bounces = quality >= Quality::High ? RenderSettings().glass_bounces : 0;
-    settings.ao = quality >= Quality::High     ? AmbientOcclusion::Full
-                  : quality >= Quality::Medium ? AmbientOcclusion::Half
-                                               : AmbientOcclusion::Off;
+    settings.ao = quality >= Quality::High ? AmbientOcclusion::Full : AmbientOcclusion::Off;
     settings.taa = quality >= Quality::Ultra && settings.view == View::Shaded;
 }
 
