@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <span>
 #include <vector>
 
 namespace kiln::cli {
@@ -22,9 +23,25 @@ constexpr std::string_view kQualities[] = {"low", "medium", "high", "ultra", "au
 constexpr std::string_view kShadows[] = {"rays", "cascades"};
 constexpr std::string_view kLightings[] = {"clusters", "volumes"};
 constexpr std::string_view kAos[] = {"off", "half", "full"};
+constexpr std::string_view kOutlines[] = {"seen", "hidden", "hulls"};
 constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels", "ao"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
+
+// Where what was asked for stands among the words that an option knows; else `none` and what to write instead.
+Result<size_t> place_of(const std::string& option, const std::string& asked, std::span<const std::string_view> words,
+                        const char* none) {
+    const auto found = std::find(words.begin(), words.end(), asked);
+    if (found != words.end()) return size_t(found - words.begin());
+    std::string mend;
+    if (const std::string_view near = nearest_word(asked, words); !near.empty()) {
+        mend = "did you mean " + std::string(near) + "?";
+    } else {
+        for (size_t i = 0; i < words.size(); ++i)
+            mend += (i == 0 ? "use " : i + 1 < words.size() ? ", " : " or ") + std::string(words[i]);
+    }
+    return usage(option + " " + asked + ": " + none + "; " + mend);
+}
 
 }  // namespace
 
@@ -46,58 +63,36 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     s.height = x == std::string::npos ? 0 : side(std::string_view(o.size).substr(x + 1));
     if (s.width < 1 || s.width > 16384 || s.height < 1 || s.height > 16384)
         return usage("--size " + o.size + ": not a size; write WIDTHxHEIGHT, each from 1 to 16384, such as 1280x720");
-    bool known = false;
-    for (size_t i = 0; i < std::size(kViews); ++i) {
-        if (o.view != kViews[i]) continue;
-        s.view = View(i);
-        known = true;
+    const auto view = place_of("--view", o.view, kViews, "there is no such view");
+    if (!view) return view.error();
+    s.view = View(*view);
+    const auto tier = place_of("--tier", o.tier, kTiers, "there is no such tier");
+    if (!tier) return tier.error();
+    s.tier = Tier(*tier);
+    if (!o.shadows.empty()) {
+        const auto shadows = place_of("--shadows", o.shadows, kShadows, "there are no such shadows");
+        if (!shadows) return shadows.error();
+        s.mesh_shadows = MeshShadows(*shadows);
     }
-    if (!known) {
-        const std::string_view near = nearest_word(o.view, kViews);
-        return usage("--view " + o.view + ": there is no such view; " +
-                     (near.empty() ? "use shaded, albedo, normal, depth, steps, bricks, levels or ao"
-                                   : "did you mean " + std::string(near) + "?"));
+    const auto lighting = place_of("--lighting", o.lighting, kLightings, "there is no such lighting");
+    if (!lighting) return lighting.error();
+    s.lighting = LightTechnique(*lighting);
+    if (!o.ao.empty()) {
+        const auto ao = place_of("--ao", o.ao, kAos, "there is no such ambient occlusion");
+        if (!ao) return ao.error();
+        s.ao = AmbientOcclusion(*ao);
     }
-    const auto tier = std::find(std::begin(kTiers), std::end(kTiers), o.tier);
-    if (tier == std::end(kTiers)) {
-        const std::string_view near = nearest_word(o.tier, kTiers);
-        return usage("--tier " + o.tier + ": there is no such tier; " +
-                     (near.empty() ? "use auto, compute, rt or mesh" : "did you mean " + std::string(near) + "?"));
-    }
-    s.tier = Tier(tier - std::begin(kTiers));
-    const auto shadows = std::find(std::begin(kShadows), std::end(kShadows), o.shadows);
-    if (!o.shadows.empty() && shadows == std::end(kShadows)) {
-        const std::string_view near = nearest_word(o.shadows, kShadows);
-        return usage("--shadows " + o.shadows + ": there are no such shadows; " +
-                     (near.empty() ? "use rays or cascades" : "did you mean " + std::string(near) + "?"));
-    }
-    if (!o.shadows.empty()) s.mesh_shadows = MeshShadows(shadows - std::begin(kShadows));
-    const auto lighting = std::find(std::begin(kLightings), std::end(kLightings), o.lighting);
-    if (lighting == std::end(kLightings)) {
-        const std::string_view near = nearest_word(o.lighting, kLightings);
-        return usage("--lighting " + o.lighting + ": there is no such lighting; " +
-                     (near.empty() ? "use clusters or volumes" : "did you mean " + std::string(near) + "?"));
-    }
-    const auto ao = std::find(std::begin(kAos), std::end(kAos), o.ao);
-    if (!o.ao.empty() && ao == std::end(kAos)) {
-        const std::string_view near = nearest_word(o.ao, kAos);
-        return usage("--ao " + o.ao + ": there is no such ambient occlusion; " +
-                     (near.empty() ? "use off, half or full" : "did you mean " + std::string(near) + "?"));
-    }
-    if (!o.ao.empty()) s.ao = AmbientOcclusion(ao - std::begin(kAos));
-    s.lighting = LightTechnique(lighting - std::begin(kLightings));
+    const auto outlines = place_of("--outlines", o.outlines, kOutlines, "there are no such outlines");
+    if (!outlines) return outlines.error();
+    s.outline_hidden = kOutlines[*outlines] == "hidden";
+    s.outline_hulls = kOutlines[*outlines] == "hulls";
     if (!(o.scale >= 0.25f && o.scale <= 1)) return usage("--scale wants a number from 0.25 to 1");
     if (o.scale < 1 && !o.taa && o.quality != "ultra")
         return usage("--scale works with --taa, or with --quality ultra; add one of them");
     s.scale = o.scale;
     if (!o.quality.empty()) {
-        const auto found = std::find(std::begin(kQualities), std::end(kQualities), o.quality);
-        if (found == std::end(kQualities)) {
-            const std::string_view near = nearest_word(o.quality, kQualities);
-            return usage(
-                "--quality " + o.quality + ": there is no such quality; " +
-                (near.empty() ? "use low, medium, high, ultra or auto" : "did you mean " + std::string(near) + "?"));
-        }
+        const auto quality = place_of("--quality", o.quality, kQualities, "there is no such quality");
+        if (!quality) return quality.error();
         if (o.no_refine || o.taa)
             return usage("--quality decides what --no-refine and --taa do; leave one of them out");
         if (o.reference > 0) return usage("--quality is for the renderer, not for --reference; leave one of them out");
@@ -115,8 +110,6 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     if (o.transparent_layers && (*o.transparent_layers < 0 || *o.transparent_layers > 16))
         return usage("--transparent-layers " + std::to_string(*o.transparent_layers) + ": it is 0 to 16");
     if (o.transparent_layers) s.transparent_layers = *o.transparent_layers;
-    s.outline_hulls = o.outline_hulls;
-    s.outline_hidden = o.outline_hidden;
     s.cull_meshes = !o.no_cull;
     s.taa = o.taa;
     s.analytic = o.analytic;

@@ -19,13 +19,14 @@ struct PictureOptions {
     uint32_t budget = 0;  ///< bricks a frame of a sequence, 0: no limit
     int reference = 0;
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
-         atlas_by_copy = false, no_cull = false, outline_hulls = false, outline_hidden = false;
+         atlas_by_copy = false, no_cull = false;
     std::optional<int> transparent_layers;  ///< left out: as the quality says
     bool taa = false;
     std::string quality;                ///< low, medium, high, ultra or auto; empty: high
     std::string shadows;                ///< of meshes: rays or cascades; empty: as the quality says, else rays
     std::string ao;                     ///< off, half or full; empty: as the quality says, full without one
     std::string lighting = "clusters";  ///< clusters or volumes
+    std::string outlines = "seen";      ///< round what is seen; hidden too; or hulls, of meshes
     float scale = 1;                    ///< with taa: rays a pixel along each side
     bool json = false, quiet = false;
     bool transcript = false;  ///< demo: tell the story of the picture

@@ -39,10 +39,11 @@ void add_render(CLI::App& app, Run& run) {
     verb->add_flag("--no-accelerate", o->no_accelerate, "visit every cell: the slow twin of the jumps");
     verb->add_flag("--no-cull", o->no_cull,
                    "draw meshes that something hides, and march on behind meshes: the same picture");
-    verb->add_flag("--outline-hulls", o->outline_hulls,
-                   "outline meshes by their back faces made larger, for comparison");
-    verb->add_flag("--outline-hidden", o->outline_hidden,
-                   "outlined things have their line also where something hides them");
+    verb->add_option(
+            "--outlines", o->outlines,
+            "round what is seen; hidden (also where something hides it); or hulls (of meshes: their back faces "
+            "made larger, for comparison)")
+        ->capture_default_str();
     verb->add_option("--transparent-layers", o->transparent_layers,
                      "things of glass that one ray may go through, 0 to 16 (default 4, or as the quality says)");
     verb->add_flag("--no-refine", o->no_refine, "leave hits where the bricks have them, not where the edits do");

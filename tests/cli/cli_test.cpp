@@ -512,6 +512,7 @@ TEST_F(CliGpu, ShadowsLightingAndScaleAreChosenOrRefusedInOneLine) {
         EXPECT_THAT(o.out, HasSubstr(said));
     const std::pair<const char*, const char*> wrong[] = {
         {"--shadows cascade", "--shadows cascade: there are no such shadows; did you mean cascades?"},
+        {"--outlines hulks", "--outlines hulks: there are no such outlines; did you mean hulls?"},
         {"--lighting volume", "--lighting volume: there is no such lighting; did you mean volumes?"},
         {"--taa --scale 0.1", "--scale wants a number from 0.25 to 1"},
         {"--scale 0.5", "--scale works with --taa, or with --quality ultra; add one of them"},
@@ -546,14 +547,15 @@ TEST_F(CliGpu, AMeshThatCannotBeReadIsToldAndTheRestIsDrawn) {
                 HasSubstr("\"mesh_clusters\": {\"in_sight\": 1, \"early\": 1, \"late\": 0, \"culled_percent\": 0}"));
     EXPECT_THAT(o.out, HasSubstr("\"faults\": [\"m.kiln.json:1:46: "));
     const Outcome all =
-        run("render m.kiln.json -o a.png --size 16x16 --json --no-cull --outline-hulls --transparent-layers 0");
+        run("render m.kiln.json -o a.png --size 16x16 --json --no-cull --outlines hulls --transparent-layers 0");
     EXPECT_EQ(all.code, 0) << all.err;
     EXPECT_THAT(all.out,
                 HasSubstr("\"mesh_clusters\": {\"in_sight\": 1, \"early\": 0, \"late\": 1, \"culled_percent\": 0}"));
     const Outcome ao = run("render m.kiln.json -o a.png --ao haft");
     EXPECT_EQ(ao.code, 2);
     EXPECT_THAT(ao.err, HasSubstr("--ao haft: there is no such ambient occlusion; use off, half or full"));
-    for (const std::string how : {"--ao off", "--ao half", "--ao full --view ao", "--quality low --ao half"})
+    for (const std::string how :
+         {"--ao off", "--ao half", "--ao full --view ao", "--quality low --ao half", "--outlines hidden"})
         EXPECT_EQ(run("render m.kiln.json -o a.png --size 16x16 -q " + how).code, 0) << how;
     const Outcome many = run("render m.kiln.json -o a.png --transparent-layers 17");
     EXPECT_EQ(many.code, 2);
