@@ -10,6 +10,7 @@
 #include <BulletCollision/CollisionDispatch/btConvexConcaveCollisionAlgorithm.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <new>
 
@@ -197,11 +198,13 @@ class FieldsAlgorithm final : public SdfAlgorithm {
 public:
     using SdfAlgorithm::SdfAlgorithm;
     ~FieldsAlgorithm() override {
-        if (more_ != nullptr) m_dispatcher->releaseManifold(more_);
+        for (btPersistentManifold* m : more_)
+            if (m != nullptr) m_dispatcher->releaseManifold(m);
     }
     void getAllContactManifolds(btManifoldArray& all) override {
         SdfAlgorithm::getAllContactManifolds(all);
-        if (more_ != nullptr) all.push_back(more_);
+        for (btPersistentManifold* m : more_)
+            if (m != nullptr) all.push_back(m);
     }
     struct Side {
         const SdfShape* sdf;
@@ -220,7 +223,14 @@ public:
         const Side side_a = side_of(a), side_b = side_of(b);
         const Pose world_from_b = side_b.world;
         const Pose b_from_a = inverse(world_from_b) * side_a.world;
-        if (as_before(b_from_a, side_a.revision + side_b.revision, result)) return;
+        if (as_before(b_from_a, side_a.revision + side_b.revision, result)) {
+            for (btPersistentManifold* m : more_) {
+                if (m == nullptr) continue;
+                result->setPersistentManifold(m);
+                result->refreshContactPoints();
+            }
+            return;
+        }
         const auto velocity = [](const btCollisionObjectWrapper* w) {
             return to_vec(w->getCollisionObject()->getInterpolationLinearVelocity());
         };
@@ -232,32 +242,88 @@ public:
         const float speed = length(velocity(a) - velocity(b)) + turns(a, side_a) + turns(b, side_b);
         const float reach = reach_of(speed * settings.m_timeStep);
         collide(*side_a.sdf, *side_b.sdf, b_from_a, reach, contacts_);
-        // Four do not stop a ring that another comes through: what comes fast has the deepest of the others too.
-        if (reach > kMargin && contacts_.size() > 4) {
-            std::vector<FieldContact> others = contacts_;
-            keep_four(contacts_);
-            std::erase_if(others, [&](const FieldContact& c) {
-                return std::any_of(contacts_.begin(), contacts_.end(),
-                                   [&](const FieldContact& kept) { return kept.point == c.point; });
-            });
-            if (others.size() > 4) others.resize(4);  // they are sorted
-            if (more_ == nullptr) more_ = m_dispatcher->getNewManifold(manifold_->getBody0(), manifold_->getBody1());
-            more_->clearManifold();
-            more_->setContactBreakingThreshold(reach);
-            contacts_.swap(others);
-            result->setPersistentManifold(more_);
-            add(result, world_from_b, false);
-            contacts_.swap(others);
-        } else if (more_ != nullptr) {
-            more_->clearManifold();
-        }
         manifold_->setContactBreakingThreshold(reach);
-        result->setPersistentManifold(manifold_);
-        add(result, world_from_b, false);
+        const auto moves = [](const btCollisionObjectWrapper* w) {
+            return !w->getCollisionObject()->isStaticOrKinematicObject();
+        };
+        if (reach > kMargin || (moves(a) && moves(b))) {
+            lay(result, world_from_b);
+        } else {
+            for (btPersistentManifold* m : more_)
+                if (m != nullptr) m->clearManifold();
+            result->setPersistentManifold(manifold_);
+            add(result, world_from_b, false);
+        }
     }
 
 private:
-    btPersistentManifold* more_ = nullptr;  // of this step alone
+    static constexpr size_t kMore = 2, kPlaces = 4;  // manifolds beside the first; points of one
+
+    // Four points do not stop a ring that another comes through, nor one that is struck from above where it lies on a third: what moves on
+    // what moves, and what comes fast, has up to twelve: first the four that stay the same, then the deepest of the others.
+    void lay(btManifoldResult* result, const Pose& world_from_b) {
+        others_ = contacts_;
+        keep_four(contacts_);
+        const size_t kept = contacts_.size();
+        for (const FieldContact& c : others_) {
+            if (contacts_.size() == (1 + kMore) * kPlaces) break;  // they are sorted
+            if (std::any_of(contacts_.begin(), contacts_.begin() + std::ptrdiff_t(kept),
+                            [&](const FieldContact& k) { return k.point == c.point; }))
+                continue;
+            contacts_.push_back(c);
+        }
+        // Bullet takes a new point for an old one that is nearer than the threshold, which may be how far the bodies come in a step. So each
+        // is made alone, and begins with the impulse of the nearest of the step before within the margin of what rests.
+        std::array<btPersistentManifold*, 1 + kMore> all{manifold_, more_[0], more_[1]};
+        std::array<btManifoldPoint, (1 + kMore) * kPlaces> before;
+        size_t had = 0;
+        for (btPersistentManifold* m : all) {
+            for (int i = 0; m != nullptr && i < m->getNumContacts(); ++i) before[had++] = m->getContactPoint(i);
+        }
+        const auto take_over = [&](btManifoldPoint& made) {
+            const auto far = [&](const btManifoldPoint& p) { return (p.m_localPointA - made.m_localPointA).length2(); };
+            const auto end = before.begin() + std::ptrdiff_t(had);
+            const auto old =
+                std::min_element(before.begin(), end,
+                                 [&](const btManifoldPoint& p, const btManifoldPoint& q) { return far(p) < far(q); });
+            if (old == end || far(*old) > kMargin * kMargin) return;
+            made.m_appliedImpulse = old->m_appliedImpulse;
+            made.m_appliedImpulseLateral1 = old->m_appliedImpulseLateral1;
+            made.m_appliedImpulseLateral2 = old->m_appliedImpulseLateral2;
+            made.m_lifeTime = old->m_lifeTime;
+            *old = before[--had];
+        };
+        const float reach = manifold_->getContactBreakingThreshold();
+        for (size_t m = 0; m < all.size(); ++m) {
+            const size_t first = std::min(m * kPlaces, contacts_.size()),
+                         last = std::min(first + kPlaces, contacts_.size());
+            if (all[m] == nullptr) {
+                if (first == last) continue;
+                all[m] = more_[m - 1] = m_dispatcher->getNewManifold(manifold_->getBody0(), manifold_->getBody1());
+            }
+            btPersistentManifold& manifold = *all[m];
+            manifold.setContactBreakingThreshold(reach);
+            result->setPersistentManifold(&manifold);
+            std::array<btManifoldPoint, kPlaces> points;
+            int count = 0;
+            for (size_t i = first; i < last; ++i) {
+                const FieldContact& c = contacts_[i];
+                const vec3 normal = rotate(world_from_b.rotation, c.normal);
+                manifold.setNumContacts(0);
+                result->addContactPoint(to_bullet(normal), to_bullet(world_from_b * c.point + normal * c.depth),
+                                        -c.depth);
+                if (manifold.getNumContacts() == 0) continue;  // beyond the reach by rounding
+                points[size_t(count)] = manifold.getContactPoint(0);
+                take_over(points[size_t(count++)]);
+            }
+            manifold.setNumContacts(count);
+            for (int i = 0; i < count; ++i) manifold.getContactPoint(i) = points[size_t(i)];
+            result->refreshContactPoints();
+        }
+    }
+
+    std::array<btPersistentManifold*, kMore> more_{};
+    std::vector<FieldContact> others_;
 };
 
 template <typename Algorithm>

@@ -33,7 +33,9 @@ constexpr float kAlike = 0.9962f;   // cosine of 5 degrees, as Jolt has it for n
 constexpr float kWorldSize = 1e5f;  // of what has no end: the tree of boxes wants finite ones
 // Jolt keeps contacts between steps, and sorts them, by the numbers of the parts that touch. A field's parts are the directions it faces.
 // Contacts of one pair that face alike within five degrees are one to Jolt (PhysicsSettings::mContactNormalCosMaxDeltaRotation), others
-// must not share a number: their order, and so the outcome, would be left to the threads.
+// must not share a number: their order, and so the outcome, would be left to the threads. Of what it makes one it keeps four points, those
+// far apart from their opposites rather than those that touch: so fields that move are not for it to reduce, and the numbers of their
+// contacts say also where they are.
 const JoltSdfShape& field_of(const JPH::Shape* s) { return *static_cast<const JoltSdfShape*>(s); }
 
 Pose pose_of(Mat44Arg m) { return {to_vec(m.GetTranslation()), to_quat(m.GetQuaternion())}; }
@@ -44,17 +46,38 @@ Pose world_of(const JoltSdfShape& field, Mat44Arg center_of_mass) {
     return out;
 }
 
-// Hits of shape 1 on the field that is shape 2; `world` is the field's frame.
-void add(const std::vector<FieldContact>& contacts, const Pose& world, bool field1, const SubShapeIDCreator& id1,
-         const SubShapeIDCreator& id2, CollideShapeCollector& collector) {
+// Where contacts of one pair lie about a centre, for their numbers: in each direction one.
+class Places {
+public:
+    explicit Places(vec3 center) : center_(center) {}
+    uint32 number(uint32 normal, vec3 point) {
+        const vec3 from = point - center_;
+        uint32 place = dot(from, from) > 0 ? facing(from) : 0;
+        while (std::find(taken_.begin(), taken_.end(), normal << kFacingBits | place) != taken_.end())
+            place = (place + 1) & ((1u << kFacingBits) - 1);
+        taken_.push_back(normal << kFacingBits | place);
+        return place;
+    }
+
+private:
+    vec3 center_;
+    StaticArray<uint32, kMostContacts> taken_;
+};
+
+// Hits of shape 1 on the field that is shape 2; `world` is the field's frame, `center1` the centre of mass of shape 1 in the world.
+void add(const std::vector<FieldContact>& contacts, const Pose& world, bool field1, bool separate, vec3 center1,
+         const SubShapeIDCreator& id1, const SubShapeIDCreator& id2, CollideShapeCollector& collector) {
+    Places places(inverse(world) * center1);
     for (const FieldContact& c : contacts) {
         if (collector.ShouldEarlyOut()) return;
         if (-c.depth >= collector.GetEarlyOutFraction()) continue;
         const vec3 normal = rotate(world.rotation, c.normal), on1 = world * c.point;
         const uint32 number = facing(c.normal);
         const SubShapeID part1 = field1 ? id1.PushID(number, kFacingBits).GetID() : id1.GetID();
+        SubShapeIDCreator part2 = id2.PushID(number, kFacingBits);
+        if (separate) part2 = part2.PushID(places.number(number, c.point), kFacingBits);
         collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
-                                            part1, id2.PushID(number, kFacingBits).GetID(),
+                                            part1, part2.GetID(),
                                             TransformedShape::sGetBodyID(collector.GetContext())));
     }
 }
@@ -113,7 +136,7 @@ void collide_meshed(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg 
     const Pose world = world_of(ground, transform2), local = inverse(world) * pose_of(transform1);
     const Convex& body = convex_of(shape1);
     const bool triangles = collide_ground(ground.sdf(), body, local, settings.mMaxSeparationDistance, contacts);
-    add(contacts, world, false, id1, id2.PushID(0, 1), collector);
+    add(contacts, world, false, false, {}, id1, id2.PushID(0, 1), collector);
     if (!triangles) return;
     // All of them together, so that an edge between two regions is seen to be an inner one.
     OwnHits own(collector, ground.sdf(), world, settings.mMaxSeparationDistance, id2.GetNumBitsWritten());
@@ -143,7 +166,8 @@ void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg 
     const Pose world = world_of(field_of(shape2), transform2);
     collide(field_of(shape2).sdf(), convex_of(shape1), inverse(world) * pose_of(transform1),
             settings.mMaxSeparationDistance, contacts);
-    add(contacts, world, false, id1, id2, collector);
+    add(contacts, world, false, field_of(shape2).sdf().moves(), to_vec(transform1.GetTranslation()), id1, id2,
+        collector);
 }
 
 void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, Vec3Arg, Mat44Arg transform1,
@@ -154,7 +178,7 @@ void collide_fields(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg,
     const Pose world1 = world_of(field_of(shape1), transform1), world2 = world_of(field_of(shape2), transform2);
     collide(field_of(shape1).sdf(), field_of(shape2).sdf(), inverse(world2) * world1, settings.mMaxSeparationDistance,
             contacts);
-    add(contacts, world2, true, id1, id2, collector);
+    add(contacts, world2, true, true, to_vec(transform1.GetTranslation()), id1, id2, collector);
 }
 
 // A field meets a mesh as the solid that the mesh is the surface of.
@@ -166,13 +190,16 @@ void collide_mesh(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg, V
     collide(field_of(shape1).sdf(), *triangles_of(shape2).solid, inverse(world2) * world1,
             settings.mMaxSeparationDistance, contacts);
     // The mesh's part is one and the same: contacts are told apart by the field's.
+    Places places(inverse(world2) * to_vec(transform1.GetTranslation()));
     for (const FieldContact& c : contacts) {
         if (collector.ShouldEarlyOut()) return;
         if (-c.depth >= collector.GetEarlyOutFraction()) continue;
         const vec3 normal = rotate(world2.rotation, c.normal), on1 = world2 * c.point;
-        collector.AddHit(CollideShapeResult(to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
-                                            id1.PushID(facing(c.normal), kFacingBits).GetID(), SubShapeID(),
-                                            TransformedShape::sGetBodyID(collector.GetContext())));
+        const uint32 number = facing(c.normal);
+        collector.AddHit(CollideShapeResult(
+            to_jolt(on1), to_jolt(on1 + normal * c.depth), to_jolt(-normal), c.depth,
+            id1.PushID(number, kFacingBits).PushID(places.number(number, c.point), kFacingBits).GetID(), SubShapeID(),
+            TransformedShape::sGetBodyID(collector.GetContext())));
     }
 }
 
@@ -243,7 +270,7 @@ AABox JoltSdfShape::GetLocalBounds() const {
 }
 
 uint JoltSdfShape::GetSubShapeIDBitsRecursive() const {
-    return sdf_->regions() != nullptr ? 1 + kRegionBits + kMeshBits : kFacingBits;
+    return sdf_->regions() != nullptr ? 1 + kRegionBits + kMeshBits : 2 * kFacingBits;
 }
 
 const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
