@@ -30,6 +30,7 @@ Result<void> Renderer::Impl::prepare() {
     field = std::make_unique<GpuField>(*runner);
     instances = std::make_unique<GpuInstances>(*runner, *field);
     meshes = std::make_unique<GpuMeshes>(*runner);
+    materials = std::make_unique<GpuMaterials>(*runner);
     const std::span<const uint32_t> table = shade::ggx_albedo_table();
     auto buffer = device->create_buffer({.size = table.size_bytes(), .label = "ggx albedo"});
     if (!buffer) return buffer.error();
@@ -157,6 +158,7 @@ Result<Picture> Renderer::Impl::render(const Frame& frame, const RenderSettings&
                      ErrorKind::Usage};
     if (auto brought = meshes->update(frame, params->camera); !brought) return brought.error();
     instances->place(frame.instances, *params, frame.materials);
+    if (auto brought = materials->update(material_records(frame)); !brought) return brought.error();
     moved = {};
     if (settings.taa && settings.view == View::Shaded) moved = moved_edits(frame, program, *params);
     const TileInputs switches = inputs(frame, settings);

@@ -9,6 +9,7 @@
 #include "render/gpu_boxes.h"
 #include "render/gpu_field.h"
 #include "render/gpu_instances.h"
+#include "render/gpu_materials.h"
 #include "render/gpu_meshes.h"
 #include "render/graph_runner.h"
 #include "render/lamp_faces.h"
@@ -40,6 +41,7 @@ struct Renderer::Impl {
     std::unique_ptr<render::GpuField> field;
     std::unique_ptr<render::GpuInstances> instances;
     std::unique_ptr<render::GpuMeshes> meshes;
+    std::unique_ptr<render::GpuMaterials> materials;
     std::unique_ptr<render::GpuBoxes> boxes;       // once a frame asked for the tier
     std::unique_ptr<render::LiveShaders> live;     // where KILN_LIVE_SHADERS asks for it
     std::unique_ptr<render::Presenter> presenter;  // where there is a window
@@ -68,6 +70,7 @@ struct Renderer::Impl {
         boxes.reset();
         field.reset();
         meshes.reset();
+        materials.reset();
         for (const rhi::BufferHandle buffer : {ggx_table, environment, exposure}) {
             if (!runner || !buffer) continue;
             runner->forget(buffer);

@@ -103,8 +103,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         if (in.levels) in.levels_block = g.block(field->levels());
         const FrameRay no_ray{};
         in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
-        const std::vector<MaterialRecord> materials = material_records(frame);
-        in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
+        in.materials = materials->import(g);
         std::vector<shade::LightRecord> lights;
         for (const Light& light : frame.lights) {
             lights.push_back(shade::light_record(light));

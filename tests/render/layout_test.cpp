@@ -4,6 +4,7 @@
 #include "render/passes/forward.h"
 #include "render/passes/instances.h"
 #include "render/passes/lamps.h"
+#include "render/passes/materials.gpu.h"
 #include "render/passes/passes.h"
 #include "render/passes/taa_up.gpu.h"
 #include "render/passes/upscale.h"
@@ -102,7 +103,11 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     expect_array(kBakeHalf, 1, words, sizeof(field::BrickRecord));
     expect_array(kMarchExact, 2, words, sizeof(field::BrickRecord));
     EXPECT_EQ(AT(MaterialRecord, metallic), 28u);
-    expect_array(kResolve, 5, words, sizeof(MaterialRecord));
+    EXPECT_EQ(AT(MaterialEntry, row), 4u);
+    std::vector<uint32_t> entry = words;
+    entry.push_back(32);
+    expect_array(kResolve, 5, entry, sizeof(MaterialEntry));
+    expect_array(kResolveInstances, 7, entry, sizeof(MaterialEntry));
     std::vector<uint32_t> ray;
     for (uint32_t i = 0; i < 12; ++i) ray.push_back(i * 4);
     EXPECT_EQ(AT(FrameRay, part_x), 16u);

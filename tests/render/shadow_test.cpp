@@ -4,6 +4,7 @@
 #include "gpu_worlds.h"
 #include "render/lib/pack.h"
 #include "render/light_rects.h"
+#include "render/passes/materials.gpu.h"
 
 #include <cmath>
 #include <numbers>
@@ -40,13 +41,13 @@ struct ShadowGpu : GpuTest {
         }
         const shade::LightRecord lamp = shade::light_record(
             {.kind = Light::Kind::Point, .position = {0, kLightHeight, 0}, .intensity = 1, .radius = kLightRadius});
-        const MaterialRecord material{};
+        const MaterialEntry material{};
         Graph g(*runner_);
         TileInputs in;
         in.field = gpu.import(g);
         in.frame = g.block(p);
         in.rays = g.upload("rays", std::span<const FrameRay>(rays));
-        in.materials = g.upload("materials", std::span<const MaterialRecord>(&material, 1));
+        in.materials = g.upload("materials", std::span<const MaterialEntry>(&material, 1));
         in.lights = g.upload("lights", std::span<const shade::LightRecord>(&lamp, 1));
         in.light_count = in.lights_of_tile = 1;
         const LightRects rects = all_light_rects(1, p.tile_width, p.tile_height);

@@ -4,6 +4,7 @@
 #include "render/lib/color.gpu.h"
 #include "render/edit_motion.h"
 #include "render/lib/pack.h"
+#include "render/material_table.h"
 #include "render/picture.h"
 #include "render/temporal.h"
 
@@ -57,8 +58,9 @@ TEST_F(MotionGpu, IsTheReprojectionOfAWorldThatStandsStill) {
     in.frame = g.block(p);
     const FrameRay no_ray{};
     in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
-    const std::vector<MaterialRecord> materials = material_records(frame);
-    in.materials = g.upload("materials", std::span<const MaterialRecord>(materials));
+    MaterialTable materials;
+    materials.update(material_records(frame));
+    in.materials = g.upload("materials", materials.entries());
     in.size = {kWidth, kHeight};
     in.motion = g.block(motion_params(frame.camera, before, kWidth, kHeight));
     const Visibility seen = march(g, in);

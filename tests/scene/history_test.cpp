@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "scene/world_impl.h"
 
+#include "field/clipmap.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "random_changes.h"
@@ -272,6 +273,66 @@ TEST(History, UndoBakesNoMoreThanTheEditDid) {
     check([&] { return world.change(id, moved); });
     check([&] { return world.remove(id); });
     check([&] { return bool(world.add(ball(0.2f, {0.1f, 0.3f, 0.9f}))); });
+}
+
+struct Work {
+    uint64_t cells = 0, baked = 0, bricks = 0;
+    friend bool operator==(const Work&, const Work&) = default;
+};
+
+// What a change reaches does not depend on its direction, at no level. So an undo looks at the cells that the edit looked at, and bakes the bricks
+// that are in them then: those of the edit, and those that it freed.
+TEST(History, InAWorldWithLevelsAnUndoLooksAtTheCellsOfTheEditAndBakesTheirBricks) {
+    World world;
+    world.field_settings = {.voxel_size = 0.05f, .cells = 32, .levels = 3, .bounds = {}};
+    for (int i = 0; i < 60; ++i)
+        ASSERT_TRUE(world.add(
+            ball(0.7f, {float(i % 5) * 1.3f - 2.6f, float(i / 5 % 4) * 1.3f - 2, float(i / 20) * 1.3f - 1.3f})));
+    History history = world.history();
+    const auto work = [&] {
+        Work sum;
+        const auto frame = world.frame(Camera{.position = {0.3f, 0.2f, 0.1f}});
+        if (!frame) return sum;
+        for (int level = 0; level < frame->levels->level_count(); ++level) {
+            const field::LevelCounts& counts = frame->levels->counts(level);
+            sum.cells += counts.cells_made, sum.baked += counts.baked, sum.bricks += counts.bricks;
+            EXPECT_EQ(counts.missing_cells + counts.edits_waiting, 0u);
+        }
+        return sum;
+    };
+    uint64_t bricks = work().bricks;
+    EXPECT_EQ(work(), (Work{0, 0, bricks})) << "a steady camera";
+    const auto check = [&](const char* what, auto&& change) {
+        ASSERT_TRUE(change()) << what;
+        const Work edit = work();
+        ASSERT_TRUE(*history.undo()) << what;
+        const Work undo = work();
+        ASSERT_TRUE(*history.redo()) << what;
+        const Work redo = work();
+        EXPECT_GT(edit.cells, 0u) << what;
+        EXPECT_LT(edit.cells, 3u * 32 * 32 * 32 / 8) << what;
+        EXPECT_EQ(undo.cells, edit.cells) << what;
+        EXPECT_EQ(undo.baked + edit.bricks, edit.baked + bricks) << what;
+        EXPECT_EQ(undo.bricks, bricks) << what;
+        EXPECT_EQ(redo, edit) << what;
+        ASSERT_TRUE(*history.undo()) << what;
+        (void)work();
+    };
+    const EditId id = world.edits()[27];
+    const auto with = [&](auto&& to) {
+        Edit e = *world.find(id);
+        to(e);
+        return world.change(id, e);
+    };
+    check("a move", [&] { return with([](Edit& e) { e.node.transform.position.x += 0.2f; }); });
+    check("a move far off", [&] { return with([](Edit& e) { e.node.transform.position = {0, 3.2f, 0.5f}; }); });
+    check("a growth", [&] { return with([](Edit& e) { e.node.shape = Sphere{.radius = 0.9f}; }); });
+    check("a blend", [&] { return with([](Edit& e) { e.blend_radius = 0.3f; }); });
+    check("a cut instead", [&] { return with([](Edit& e) { e.op = Op::Subtract; }); });
+    check("a removal", [&] { return world.remove(id); });
+    check("an addition in the crowd", [&] { return bool(world.add(ball(0.5f, {0.1f, 0.3f, 0.9f}))); });
+    check("an addition in the open", [&] { return bool(world.add(ball(0.4f, {0, 3.6f, 0}))); });
+    check("another place in the list", [&] { return world.reorder(id, world.edits()[3]); });
 }
 
 TEST(History, ADragBetweenTwoFramesIsOneChangeOfTheField) {

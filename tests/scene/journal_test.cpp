@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "scene/journal.h"
 
+#include "field/clipmaps.h"
+#include "field/host_bricks.h"
 #include "kept_scene.h"
 #include "random_changes.h"
 #include "scene_text.h"
@@ -69,6 +71,49 @@ TEST_F(Journals, EveryChangeIsThereBeforeItsCallReturns) {
         ASSERT_EQ(loaded(), world.to_json()) << i;
     }
     EXPECT_EQ(bytes_of(scene_), kScene);
+}
+
+// As it was baked while the log was made, edit by edit, and as it is baked from the log that 1, 2 or 8 threads read and bake.
+TEST_F(Journals, TheFieldOfALogIsTheSameForAnyNumberOfThreads) {
+    const FieldSettings one_level{.voxel_size = 0.06f, .bounds = Box3{{-1.2f, -1.2f, -1.2f}, {1.2f, 1.2f, 1.2f}}};
+    const FieldSettings levels{.voxel_size = 0.06f, .cells = 32, .levels = 3, .bounds = {}};
+    const Camera camera{.position = {0.2f, 0.1f, 0.3f}};
+    const auto seen = [&](World& world, const FieldSettings& settings) {
+        world.field_settings = settings;
+        auto frame = world.frame(camera);
+        EXPECT_TRUE(frame) << frame.error().message;
+        return std::move(*frame);
+    };
+    uint64_t field_hash = 0, levels_hash = 0, before = 0;
+    {
+        World world = open();
+        RandomChanges random(13);
+        for (int i = 0; i < 60; ++i) {
+            (void)random.one(world);
+            if (i % 5 == 0) (void)world.history().undo(), random.look(world);
+            if (i % 6 == 5) before = field::hash_of_bricks(*seen(world, levels).levels);
+        }
+        const auto any = field::worlds::edit(Sphere{.radius = 0.5f}, {0.2f, 0.1f, -0.3f});
+        ASSERT_TRUE(world.add(any));
+        levels_hash = field::hash_of_bricks(*seen(world, levels).levels);
+        field_hash = field::HostBricks::bake(seen(world, one_level).field).hash();
+        ASSERT_NE(levels_hash, before);
+    }
+    for (const int workers : {1, 2, 8}) {
+        auto world = World::load(scene_, workers);
+        ASSERT_TRUE(world) << world.error().message;
+        const Frame whole = seen(*world, one_level), around = seen(*world, levels);
+        field::FieldOptions of_field = whole.field->options();
+        of_field.workers = workers;
+        const auto field = field::Field::build(whole.field->shared_program(), of_field);
+        ASSERT_TRUE(field) << field.error().message;
+        EXPECT_EQ(field::HostBricks::bake(*field, workers).hash(), field_hash) << workers;
+        field::ClipmapOptions of_levels = around.levels->options();
+        of_levels.workers = workers;
+        field::Clipmap map = field::made(around.levels->program(), around.levels->focus(), of_levels);
+        ASSERT_TRUE(map.work());
+        EXPECT_EQ(field::hash_of_bricks(map), levels_hash) << workers;
+    }
 }
 
 TEST_F(Journals, WhatIsReadIsTheSameForAnyNumberOfThreads) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT
-// Materials by number, mixed into a surface. The including kernel declares first: FrameParams frame, MaterialRecord material_table[], and
+// Materials by number, mixed into a surface. The including kernel declares first: FrameParams frame, MaterialEntry material_table[], and
 // has surface.glsl.
 
 MaterialRecord material_of(uint number) {
-    return material_table[number < frame.material_count ? number : 0u];
+    return material_table[material_table[number < frame.material_count ? number : 0u].row_of_number].row;
 }
 
 void add_material(inout SurfaceSample s, uint number, float weight) {

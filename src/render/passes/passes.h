@@ -109,7 +109,7 @@ struct TileInputs {
     Block frame;         // FrameParams
     Block levels_block;  // LevelsBlock; of a clipmap
     Buffer rays;         // FrameRay a pixel; a dummy unless kFrameRays
-    Buffer materials;    // MaterialRecord
+    Buffer materials;    // MaterialEntry
     Buffer lights;       // LightRecord
     Buffer ggx_table;
     Buffer environment;  // EnvironmentMap::words; a dummy unless image_sky

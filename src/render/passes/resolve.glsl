@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 // What each visible point looks like: normal, material; once per pixel. With KILN_EXACT also points found on exact code.
 
+#include "render/passes/materials.gpu.h"
+
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
@@ -8,7 +10,7 @@ layout(set = 0, binding = 1, std430) readonly buffer Cells { uint cells[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Records { BrickRecord records[]; };
 layout(set = 0, binding = 3, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialRecord material_table[]; };
+layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialEntry material_table[]; };
 layout(set = 0, binding = 6) uniform texture3D distances;
 layout(set = 0, binding = 7) uniform utexture3D materials;
 layout(set = 0, binding = 8) uniform utexture2D visibility;

@@ -5,6 +5,7 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
 #include "render/passes/instances.gpu.h"
+#include "render/passes/materials.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
@@ -15,7 +16,7 @@ layout(set = 0, binding = 3, std430) readonly buffer Cells { uint instance_cells
 layout(set = 0, binding = 4, std430) readonly buffer Records { BrickRecord records[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 7, std430) readonly buffer MaterialTable { MaterialRecord material_table[]; };
+layout(set = 0, binding = 7, std430) readonly buffer MaterialTable { MaterialEntry material_table[]; };
 layout(set = 0, binding = 8) uniform texture3D distances;
 layout(set = 0, binding = 9) uniform utexture3D materials;
 layout(set = 0, binding = 10) uniform utexture2D visibility;
