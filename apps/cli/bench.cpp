@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <utility>
 
 namespace kiln::cli {
 
@@ -57,16 +58,16 @@ void print_table(const std::vector<std::vector<std::string>>& rows, std::string&
 std::string table_of(const BenchReport& report) {
     std::string out = report.machine + "; load " + short_number(report.load) + "\n";
     std::vector<std::vector<std::string>> rows;
-    int kind = -1;
+    std::pair<int, std::string> under;  // which scene the rows are of
     for (const BenchRow& r : report.rows) {
-        if (r.kind != kind || rows.empty()) {
+        if (std::pair(r.kind, r.scene) != under || rows.empty()) {
             if (!rows.empty()) print_table(rows, out);
             out += "\n" +
                    (r.scene.empty() ? "kind " + std::to_string(r.kind) + ", seed " + std::to_string(r.seed) : r.scene) +
                    ", " + std::to_string(r.count) + " edits\n";
             rows = {{"row", "value", "unit", "threads", "peer", "peer's", "ratio", "of roof", "bricks", "texels",
                      "checksum"}};
-            kind = r.kind;
+            under = {r.kind, r.scene};
         }
         rows.push_back({r.name, short_number(r.value), r.unit, std::to_string(r.threads), r.peer.empty() ? "-" : r.peer,
                         short_number(r.peer_value), short_number(r.ratio),

@@ -69,22 +69,19 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 }
 
 CellMaker::OwnRoom CellMaker::take_room() {
-    std::vector<Room*>& spare = spare_rooms().rooms;
+    std::vector<std::unique_ptr<Room>>& spare = spare_rooms();
     if (spare.empty()) return OwnRoom(new Room);
-    OwnRoom out(spare.back());
+    OwnRoom out(spare.back().release());
     spare.pop_back();
     return out;
 }
 
-void CellMaker::GiveBack::operator()(Room* room) const { spare_rooms().rooms.push_back(room); }
+void CellMaker::GiveBack::operator()(Room* room) const { spare_rooms().emplace_back(room); }
 
 // A thread's.
-CellMaker::Rooms& CellMaker::spare_rooms() {
-    static thread_local Rooms all;
+std::vector<std::unique_ptr<CellMaker::Room>>& CellMaker::spare_rooms() {
+    static thread_local std::vector<std::unique_ptr<Room>> all;
     return all;
-}
-CellMaker::Rooms::~Rooms() {
-    for (Room* const room : rooms) delete room;
 }
 
 // Rows that reach the box of cells, in order.

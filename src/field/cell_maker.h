@@ -86,11 +86,7 @@ class CellMaker {
         std::vector<uint32_t> rows;
         std::vector<sdf::Instruction> code;
     };
-    struct Rooms {
-        std::vector<Room*> rooms;
-        ~Rooms();
-    };
-    static Rooms& spare_rooms();
+    static std::vector<std::unique_ptr<Room>>& spare_rooms();
     struct GiveBack {
         void operator()(Room* room) const;
     };

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 namespace kiln::field {
 
@@ -16,6 +17,10 @@ namespace kiln::field {
 using Eight __attribute__((vector_size(32))) = uint32_t;
 inline constexpr Eight kLanes{0, 1, 2, 3, 4, 5, 6, 7};
 static_assert(kCellPage == 8);
+
+inline bool is_brick(uint32_t word) { return (word & kCellOccupied) != 0 && word != kCellMissing; }
+/// The order of cells in a box.
+inline bool before(ivec3 a, ivec3 b) { return a.z != b.z ? a.z < b.z : a.y != b.y ? a.y < b.y : a.x < b.x; }
 
 /// Where a row of cells lies in its page.
 inline size_t row_of(int y, int z) {
@@ -37,6 +42,53 @@ void each_page(const CellMap& cells, const CellBox& box, Fn&& fn) {
             }
         }
     }
+}
+
+/// The first position of the row of a page that x is in.
+inline int first_of_row(int x) { return x & ~(kCellPage - 1); }
+
+/// fn(words, changes, part, y, z) of the rows of a box: which bits of them to turn. `part` is what their page has of it. Pages that stay as they are
+/// are not copied.
+template <typename Fn>
+void rewrite(CellMap& cells, const CellBox& box, Fn&& fn) {
+    each_page(cells, box, [&](size_t page, const CellBox& part) {
+        const CellMap::Words::Page* old = cells.words().find(page);
+        for (int z = part.min.z; z < part.max.z; ++z) {
+            for (int y = part.min.y; y < part.max.y; ++y) {
+                Eight had = Eight{} + uint32_t(kMaxJump);
+                if (old != nullptr) std::memcpy(&had, old->data() + row_of(y, z), sizeof had);
+                Eight changes{};
+                fn(had, changes, part, y, z);
+                uint64_t halves[4];
+                std::memcpy(halves, &changes, sizeof changes);
+                if ((halves[0] | halves[1] | halves[2] | halves[3]) == 0) continue;
+                CellMap::Words::Page& mine = cells.words().write_page(page);
+                had ^= changes;
+                std::memcpy(mine.data() + row_of(y, z), &had, sizeof had);
+                old = &mine;
+            }
+        }
+    });
+}
+
+/// fn(word, cell) for the words of a box, a page at a time.
+template <typename Cells, typename Fn>
+void each_word(Cells& cells, const CellBox& box, Fn&& fn) {
+    each_page(cells, box, [&](size_t page, const CellBox& part) {
+        auto& words = [&]() -> auto& {
+            if constexpr (std::is_const_v<Cells>)
+                return *cells.words().find(page);
+            else
+                return cells.words().write_page(page);
+        }
+        ();
+        for (int z = part.min.z; z < part.max.z; ++z) {
+            for (int y = part.min.y; y < part.max.y; ++y) {
+                auto* const row = words.data() + row_of(y, z);
+                for (int x = part.min.x; x < part.max.x; ++x) fn(row[x & (kCellPage - 1)], ivec3{x, y, z});
+            }
+        }
+    });
 }
 
 /// Word k of entry b is bit k of b.

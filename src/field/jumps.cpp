@@ -140,31 +140,17 @@ void update_jumps(CellMap& cells, const CellBox& box) {
         std::swap(near, next);
         jump.add(near, k);
     }
-    each_page(cells, box, [&](size_t page, const CellBox& part) {
-        const CellMap::Words::Page* old = cells.words().find(page);
-        const int cx = part.min.x & ~(kCellPage - 1), x8 = (cx - wide.min.x) / kCellPage;
+    rewrite(cells, box, [&](const Eight& had, Eight& changes, const CellBox& part, int y, int z) {
+        const int cx = first_of_row(part.min.x), x8 = (cx - wide.min.x) / kCellPage;
+        const int ly = y - wide.min.y, lz = z - wide.min.z;
         const Eight ours = Eight(kLanes >= uint32_t(part.min.x - cx)) & Eight(kLanes < uint32_t(part.max.x - cx));
-        for (int z = part.min.z; z < part.max.z; ++z) {
-            for (int y = part.min.y; y < part.max.y; ++y) {
-                Eight had = Eight{} + uint32_t(kMaxJump);
-                if (old != nullptr) std::memcpy(&had, old->data() + row_of(y, z), sizeof had);
-                const int ly = y - wide.min.y, lz = z - wide.min.z;
-                Eight low, middle, high;
-                spread(jump.byte(0, x8, ly, lz), low);
-                spread(jump.byte(1, x8, ly, lz), middle);
-                spread(jump.byte(2, x8, ly, lz), high);
-                const Eight found = low | middle << 1 | high << 2;
-                // Zero where nothing changes: in occupied cells, and beyond the box.
-                const Eight changes = (had ^ ((had & kCellInside) | found)) & ours & ((had >> 31) - 1);
-                uint64_t halves[4];
-                std::memcpy(halves, &changes, sizeof changes);
-                if ((halves[0] | halves[1] | halves[2] | halves[3]) == 0) continue;
-                CellMap::Words::Page& mine = cells.words().write_page(page);
-                had ^= changes;
-                std::memcpy(mine.data() + row_of(y, z), &had, sizeof had);
-                old = &mine;
-            }
-        }
+        Eight low, middle, high;
+        spread(jump.byte(0, x8, ly, lz), low);
+        spread(jump.byte(1, x8, ly, lz), middle);
+        spread(jump.byte(2, x8, ly, lz), high);
+        const Eight found = low | middle << 1 | high << 2;
+        // Zero where nothing changes: in occupied cells, and beyond the box.
+        changes = (had ^ ((had & kCellInside) | found)) & ours & ((had >> 31) - 1);
     });
 }
 

@@ -125,46 +125,22 @@ private:
     std::vector<Row> rows_;
 };
 
-// fn(words, changes, x, y, z) of a row: which bits of them to turn.
-template <typename Fn>
-void rewrite(CellMap& cells, const CellBox& box, Fn&& fn) {
-    each_page(cells, box, [&](size_t page, const CellBox& part) {
-        const CellMap::Words::Page* old = cells.words().find(page);
-        const int x = part.min.x & ~(kCellPage - 1);
-        for (int z = part.min.z; z < part.max.z; ++z) {
-            for (int y = part.min.y; y < part.max.y; ++y) {
-                Eight had = Eight{} + uint32_t(kMaxJump);
-                if (old != nullptr) std::memcpy(&had, old->data() + row_of(y, z), sizeof had);
-                Eight changes{};
-                fn(had, changes, x, y, z);
-                uint64_t halves[4];
-                std::memcpy(halves, &changes, sizeof changes);
-                if ((halves[0] | halves[1] | halves[2] | halves[3]) == 0) continue;
-                CellMap::Words::Page& mine = cells.words().write_page(page);
-                had ^= changes;
-                std::memcpy(mine.data() + row_of(y, z), &had, sizeof had);
-                old = &mine;
-            }
-        }
-    });
-}
-
 // Ones in the lanes that hold bricks.
 void bricks_of(const Eight& words, Eight& out) { out = ~((words >> 31) - 1) & Eight(words != kCellMissing); }
 
 void settle_marks(CellMap& cells, const CellBox& box, const CellBox& window, bool any_missing) {
     const int mask = cells.size().x - 1;
     if (!any_missing) {
-        rewrite(cells, box, [](const Eight& had, Eight& changes, int, int, int) {
+        rewrite(cells, box, [](const Eight& had, Eight& changes, const CellBox&, int, int) {
             bricks_of(had, changes);
             changes &= had & kCellFades;
         });
         return;
     }
     const MissingAround around(cells, box, {window.min.x & mask, window.min.y & mask, window.min.z & mask});
-    rewrite(cells, box, [&](const Eight& had, Eight& changes, int x, int y, int z) {
+    rewrite(cells, box, [&](const Eight& had, Eight& changes, const CellBox& part, int y, int z) {
         Eight beside;
-        spread(around.eight(x / kCellPage, y, z), beside);
+        spread(around.eight(first_of_row(part.min.x) / kCellPage, y, z), beside);
         bricks_of(had, changes);
         changes &= (had ^ beside << std::countr_zero(kCellFades)) & kCellFades;
     });
@@ -177,9 +153,9 @@ void come_near(CellMap& cells, const CellBox& box, bool missing) {
     const auto by = [&](int low, int high) { return std::min(kReach, std::max(cells.size().x - (high - low), 0)); };
     const ivec3 more{by(box.min.x, box.max.x), by(box.min.y, box.max.y), by(box.min.z, box.max.z)};
     const auto past = [](int at, int first, int last) { return std::max({first - at, at - (last - 1), 0}); };
-    const auto lower = [&](const Eight& had, Eight& changes, int x, int y, int z) {
+    const auto lower = [&](const Eight& had, Eight& changes, const CellBox& part, int y, int z) {
         const int off = std::max({past(y, box.min.y, box.max.y), past(z, box.min.z, box.max.z), 1});
-        const Ints at = Ints(kLanes) + x, below = box.min.x - at, above = at - (box.max.x - 1);
+        const Ints at = Ints(kLanes) + first_of_row(part.min.x), below = box.min.x - at, above = at - (box.max.x - 1);
         const Ints by_x = below > above ? below : above;
         const Eight away = Eight(by_x > off ? by_x : Ints{} + off);
         const Eight jump = had & uint32_t(kMaxJump);

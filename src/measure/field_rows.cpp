@@ -687,7 +687,9 @@ private:
     }
     void memory(const char* name, const HostBricks& bricks) {
         run_.stage("memory");
-        const Stored mine = stored(bricks, stride_), slow_way = brute_force(*scene_.program, bricks.field(), stride_);
+        const Stored mine = stored(bricks, stride_);
+        const Stored slow_way =
+            &bricks == start_.get() ? slow() : brute_force(*scene_.program, bricks.field(), stride_);
         const double bytes = double(mine.bricks) * field::kBrickTexelCount * bricks.texel_bytes();
         BenchRow out = row(name, bytes / double(std::max<uint64_t>(slow_way.band_voxels, 1)), "B", 1);
         if (peer_grid() != nullptr) {

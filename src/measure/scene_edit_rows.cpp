@@ -129,6 +129,7 @@ private:
         out.unit = "µs";
         out.threads = 1;
         out.count = program_->index.size();
+        out.scene = scene_;
         run_.add_checked(out, found, slow_way);
     }
 

@@ -32,8 +32,9 @@ std::pair<int, int> rays_of(const RenderSettings& settings) {
 }
 
 uint32_t ao_every(const RenderSettings& settings) {
-    if (settings.view == View::Ao) return settings.ao == AmbientOcclusion::Half ? 2 : 1;
-    if (settings.view != View::Shaded || settings.ao == AmbientOcclusion::Off) return 0;
+    const bool shown =
+        settings.view == View::Ao || (settings.view == View::Shaded && settings.ao != AmbientOcclusion::Off);
+    if (!shown) return 0;
     return settings.ao == AmbientOcclusion::Half ? 2 : 1;
 }
 

@@ -5,6 +5,7 @@
 
 #include "sdf/eval.h"
 #include "worlds.h"
+#include "rounds.h"
 
 #include <cmath>
 #include <cstring>
@@ -300,7 +301,7 @@ TEST(Field, IncrementalIsFullAfterRandomEdits) {
         worlds::Random r(seed + 100);
         worlds::Live live(world.edits);
         HostBricks host = *HostBricks::build(live.program(), world.options);
-        for (int step = 0; step < 30; ++step) {
+        for (int step = 0; step < rounds(30); ++step) {
             const std::string name = "seed " + std::to_string(seed) + " step " + std::to_string(step);
             change(r, world.edits);
             const std::vector<RowChange> changes = live.become(world.edits);
@@ -341,7 +342,7 @@ TEST(Field, IncrementalIsFullInACrowdThatBlends) {
     worlds::Live live(world.edits);
     HostBricks host = *HostBricks::build(live.program(), world.options);
     uint64_t baked = 0;
-    for (int step = 0; step < 60; ++step) {
+    for (int step = 0; step < rounds(60); ++step) {
         std::vector<Edit>& edits = world.edits;
         const size_t at = size_t(r.below(int(edits.size())));
         switch (r.below(4)) {
@@ -366,7 +367,7 @@ TEST(Field, IncrementalIsFullInACrowdThatBlends) {
         ASSERT_EQ(host.hash(), HostBricks::bake(full).hash()) << "step " << step;
         if (HasFatalFailure()) return;
     }
-    EXPECT_GT(baked, 1000u);
+    EXPECT_GT(baked, uint64_t(rounds(1000)));
 }
 
 TEST(Field, AnUpdateThatChangesNothingBakesNothing) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "field/jumps.h"
 #include "worlds.h"
+#include "rounds.h"
 
 namespace kiln::field {
 namespace {
@@ -66,7 +67,7 @@ TEST(Jumps, ChangeOnlyWithinSevenCellsOfAChange) {
     worlds::Random r(5);
     Grid g = random_grid(5, {25, 25, 25}, 30);
     update_jumps(g.cells, {{0, 0, 0}, g.size});
-    for (int i = 0; i < 12; ++i) {
+    for (int i = 0; i < rounds(12); ++i) {
         const int x = r.below(25), y = r.below(25), z = r.below(25);
         g.cells.set(x, y, z, (g.at(x, y, z) & kCellOccupied) != 0 ? 0u : kCellOccupied | 99u);
         update_jumps(g.cells, grown({{x, y, z}, {x + 1, y + 1, z + 1}}, kMaxJump - 1, g.size));

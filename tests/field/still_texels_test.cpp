@@ -3,6 +3,7 @@
 #include "field/host_bricks.h"
 
 #include "worlds.h"
+#include "rounds.h"
 
 #include <gtest/gtest.h>
 
@@ -32,7 +33,7 @@ TEST(StillTexels, WhatIsNotBakedIsWhatARebuildHas) {
         worlds::Live live(world.edits);
         HostBricks host = *HostBricks::build(live.program(), world.options);
         uint64_t baked = 0, without = 0;
-        for (int step = 0; step < 40; ++step) {
+        for (int step = 0; step < rounds(40); ++step) {
             std::vector<Edit>& edits = world.edits;
             for (int n = step % 7 == 0 ? 3 : 1; n-- > 0;) {
                 const size_t at = size_t(r.below(int(edits.size())));

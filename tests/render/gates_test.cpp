@@ -148,27 +148,35 @@ TEST(Gates, AnImageOfTheSkyHasNoSeam) {
     EXPECT_LE(worst, 1.0f / 255);
 }
 
-// Gates G24 and G25 of a frame with everything in it: two renderers draw the same bits, and no picture but the first makes a pipeline.
-TEST_F(GatesSlowGpu, AFrameOfEverythingIsTheSameInTwoRunsAndMakesNoPipelineLate) {
+// A ball of glass, a sheet that blends, and a particle.
+Frame frame_with_see_through() {
     Frame frame = frame_of(on_ground());
     frame.materials[1].opacity = 0.2f;
     auto set = rhi::must(field::BrickSet::make(field::worlds::compiled({field::worlds::edit(Sphere{0.4f})}), 0.05f));
-    const Pose at{{0, 1, 0.5f}, {}}, beside{{-0.9f, 0.4f, 0.8f}, {}};
-    frame.instances = {Instance{.bricks = set, .pose = at, .before = at, .material = 1, .glass = 1},
-                       Instance{.bricks = set, .pose = beside, .before = beside, .material = 2}};
+    frame.instances = {
+        Instance{.bricks = set, .pose = {{0, 1, 0.5f}, {}}, .before = {{0, 1, 0.5f}, {}}, .material = 1, .glass = 1}};
     model::Surface s = meshes::matte({1, 0.5f, 0.2f}, 1);
     s.base_color.w = 0.5f;
     s.blend = s.double_sided = true;
-    frame.meshes = {meshes::at(meshes::sheet(-0.8f, -0.8f, 0.8f, 0.8f, s), {0, 0.6f, 0}),
-                    meshes::at(meshes::sphere(0.3f, 16, meshes::matte({0.2f, 0.8f, 0.3f})), {0.8f, 0.3f, 0.9f})};
-    frame.meshes[1].outline = Outline{.color = {1, 0, 0}, .width_px = 2};
-    frame.outlines = {{frame.field->program().rows()[1], Outline{.color = {0, 1, 0}, .width_px = 2}}};
+    frame.meshes = {meshes::at(meshes::sheet(-0.8f, -0.8f, 0.8f, 0.8f, s), {0, 0.6f, 0})};
     frame.particles = {Particle{.position = {0.2f, 0.5f, 0.4f},
                                 .before = {},
                                 .radius = 0.3f,
                                 .color = {1, 1, 1},
                                 .opacity = 0.6f,
                                 .emissive = {}}};
+    return frame;
+}
+
+// Gates G24 and G25 of a frame with everything in it: two renderers draw the same bits, and no picture but the first makes a pipeline.
+TEST_F(GatesSlowGpu, AFrameOfEverythingIsTheSameInTwoRunsAndMakesNoPipelineLate) {
+    Frame frame = frame_with_see_through();
+    const Pose beside{{-0.9f, 0.4f, 0.8f}, {}};
+    frame.instances.push_back(
+        Instance{.bricks = frame.instances[0].bricks, .pose = beside, .before = beside, .material = 2});
+    frame.meshes.push_back(meshes::at(meshes::sphere(0.3f, 16, meshes::matte({0.2f, 0.8f, 0.3f})), {0.8f, 0.3f, 0.9f}));
+    frame.meshes[1].outline = Outline{.color = {1, 0, 0}, .width_px = 2};
+    frame.outlines = {{frame.field->program().rows()[1], Outline{.color = {0, 1, 0}, .width_px = 2}}};
     frame.lines = {DebugLine{{-1, 0, 0}, {1, 1, 0}}};
     frame.lights.push_back({.kind = Light::Kind::Point, .position = {1, 2, 1}, .intensity = 3, .radius = 0.1f});
     frame.camera.bloom = 0.1f;
@@ -198,21 +206,7 @@ TEST_F(GatesSlowGpu, AFrameOfEverythingIsTheSameInTwoRunsAndMakesNoPipelineLate)
 
 // Gate: what is behind glass, panes, particles and lines needs no copy of depth: the frame copies nothing but what leaves it or comes in.
 TEST_F(GatesGpu, NothingOfAFrameIsCopiedForWhatIsTransparent) {
-    Frame frame = frame_of(on_ground());
-    frame.materials[1].opacity = 0.2f;
-    auto set = rhi::must(field::BrickSet::make(field::worlds::compiled({field::worlds::edit(Sphere{0.4f})}), 0.05f));
-    frame.instances = {
-        Instance{.bricks = set, .pose = {{0, 1, 0.5f}, {}}, .before = {{0, 1, 0.5f}, {}}, .material = 1, .glass = 1}};
-    model::Surface s = meshes::matte({1, 0.5f, 0.2f}, 1);
-    s.base_color.w = 0.5f;
-    s.blend = s.double_sided = true;
-    frame.meshes = {meshes::at(meshes::sheet(-0.8f, -0.8f, 0.8f, 0.8f, s), {0, 0.6f, 0})};
-    frame.particles = {Particle{.position = {0.2f, 0.5f, 0.4f},
-                                .before = {},
-                                .radius = 0.3f,
-                                .color = {1, 1, 1},
-                                .opacity = 0.6f,
-                                .emissive = {}}};
+    const Frame frame = frame_with_see_through();
     (void)picture(frame, {.width = 40, .height = 30, .refine = false});
     ASSERT_FALSE(renderer->stats().passes.empty());
     int copies = 0;

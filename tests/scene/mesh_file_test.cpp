@@ -5,6 +5,7 @@
 #include "field/self_crossings.h"
 #include "scene_text.h"
 #include "temp_folder.h"
+#include "rounds.h"
 
 #include <kiln/world.h>
 
@@ -85,7 +86,7 @@ TEST(WorldMesh, BundledScenesAreClosedSmoothAndSharp) {
         ASSERT_TRUE(world);
         const Box3 box = world->field_settings.bounds.value_or(world->bounds());
         const vec3 size = box.max - box.min;
-        const float cell = std::max({size.x, size.y, size.z}) / 100;
+        const float cell = std::max({size.x, size.y, size.z}) / float(rounds(100));
         for (const bool sharp : {false, true}) expect_closed(mesh_of(*world, {.cell = cell, .sharp = sharp}), name);
     }
 }

@@ -36,6 +36,7 @@ void main() {
     uint owner = texelFetch(owners_seen, pixel, 0).r;
     if (owner == 0u) {
         TexelRay ray = pixel_ray(pixel);
+        float nearest = kFarMetres;
         for (uint i = 0u; i < push.count; ++i) {
             OutlineRecord r = outlines[i];
             of_object = r.instance != kNoInstance;
@@ -50,11 +51,12 @@ void main() {
             }
             // The code's values are no more than the true distance.
             float t = 0.0;
-            for (int step = 0; step < kMostSteps && t < kFarMetres; ++step) {
+            for (int step = 0; step < kMostSteps && t < nearest; ++step) {
                 float d = tape_distance(r.code_first, r.code_count, from + direction * t);
                 float enough = max(0.05 * frame.grid.voxel_size, 0.25 * frame.pixel_angle * t);
                 if (d <= enough) {
                     owner = i + 1u;
+                    nearest = t;
                     break;
                 }
                 t += d;
