@@ -5,6 +5,7 @@
 #include "cli/json.h"
 #include "cli/scene.h"
 #include "cli/talk.h"
+#include "player/player.h"
 
 #include <kiln/world.h>
 
@@ -24,7 +25,6 @@ constexpr std::string_view kShadows[] = {"rays", "cascades"};
 constexpr std::string_view kLightings[] = {"clusters", "volumes"};
 constexpr std::string_view kAos[] = {"off", "half", "full"};
 constexpr std::string_view kOutlines[] = {"seen", "hidden", "hulls"};
-constexpr std::string_view kViews[] = {"shaded", "albedo", "normal", "depth", "steps", "bricks", "levels", "ao"};
 
 Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
@@ -63,7 +63,7 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
     s.height = x == std::string::npos ? 0 : side(std::string_view(o.size).substr(x + 1));
     if (s.width < 1 || s.width > 16384 || s.height < 1 || s.height > 16384)
         return usage("--size " + o.size + ": not a size; write WIDTHxHEIGHT, each from 1 to 16384, such as 1280x720");
-    const auto view = place_of("--view", o.view, kViews, "there is no such view");
+    const auto view = place_of("--view", o.view, player::view_names(), "there is no such view");
     if (!view) return view.error();
     s.view = View(*view);
     const auto tier = place_of("--tier", o.tier, kTiers, "there is no such tier");

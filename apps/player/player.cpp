@@ -525,6 +525,8 @@ Result<void> run_player(const PlayerOptions& options) {
     return done;
 }
 
+std::span<const std::string_view> view_names() { return kViews; }
+
 std::string_view player_keys() {
     return "left mouse        dig, and cut bodies; what is cut off falls\n"
            "middle mouse, B   add ground\n"

@@ -6,6 +6,7 @@
 #include <kiln/result.h>
 
 #include <functional>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -32,5 +33,8 @@ Result<void> run_player(const PlayerOptions& options);
 
 /// What keys and mouse do, a line each.
 std::string_view player_keys();
+
+/// By View.
+std::span<const std::string_view> view_names();
 
 }  // namespace kiln::player

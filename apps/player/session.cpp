@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #include "player/session.h"
 
+#include "player/json.h"
+
 #include <algorithm>
 #include <charconv>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <utility>
 
@@ -15,21 +16,6 @@ namespace {
 std::string number(float value) {
     char buffer[32];
     return std::string(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
-}
-
-std::string quoted(const std::string& text) {
-    std::string out = "\"";
-    for (const char c : text) {
-        char buffer[8];
-        if (uint8_t(c) < 0x20) {
-            std::snprintf(buffer, sizeof buffer, "\\u%04x", unsigned(uint8_t(c)));
-            out += buffer;
-            continue;
-        }
-        if (c == '"' || c == '\\') out += '\\';
-        out += c;
-    }
-    return out + "\"";
 }
 
 }  // namespace
@@ -164,7 +150,7 @@ Result<void> Session::dig(vec3 at, float radius, bool add, const std::string& bo
     told.command = "{\"add\": {\"id\": \"" + told.name + "\", \"shape\": \"sphere\", \"radius\": " + number(radius) +
                    ", \"position\": [" + number(at.x) + ", " + number(at.y) + ", " + number(at.z) + "], \"op\": \"" +
                    (add ? "union" : "subtract") + "\", \"blend_radius\": " + number(radius * 0.25f) + "}";
-    if (!body.empty()) told.command += ", \"target\": " + quoted(body);
+    if (!body.empty()) told.command += ", \"target\": " + Json::quoted(body);
     told.command += "}";
     if (auto applied = play_->apply(told.command, "a dig"); !applied) return applied;
     // What is cut from a body is the play's alone, as what it becomes is. Of the ground: both or none.
