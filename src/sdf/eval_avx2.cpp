@@ -41,7 +41,6 @@ namespace few {  // the same on sixteen points
 
 #include "sdf/eval_entry.inl"
 
-static inline uint32_t lane_bits(mask m) { return uint32_t(_mm256_movemask_ps(__m256(m.v))); }
 #include "sdf/eval_list.inl"
 #include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::avx2

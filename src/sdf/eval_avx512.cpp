@@ -41,7 +41,6 @@ namespace few {  // the same on sixteen points
 
 #include "sdf/eval_entry.inl"
 
-static inline uint32_t lane_bits(mask m) { return uint32_t(_mm512_movepi32_mask(__m512i(m.v))); }
 #define KILN_HALVES
 static inline void store_half_words(uint16_t* to, lane_f v) {
     const __m256i words = _mm512_maskz_cvtps_ph(0xffff, __m512(v), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);

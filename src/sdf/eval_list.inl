@@ -5,7 +5,7 @@
 // one loop, z innermost, so that what does not depend on z is hoisted; everything else runs slice by slice through the interpreter.
 // Both give the bits of evaluate_points().
 
-// Lanes where m holds, one bit each; see each including file.
+// Points where m holds, one bit each.
 static inline uint64_t chunk_bits(const mask* m) {
     uint64_t out = 0;
     for (int i = 0; i < KILN_VECTORS; ++i) out |= uint64_t(lane_bits(m[i])) << (i * (kChunkPoints / KILN_VECTORS));

@@ -22,7 +22,6 @@ static inline void store(float* to, real v) { *to = v; }
 #include "sdf/eval_lanes.inl"
 #include "sdf/eval_entry.inl"
 
-static inline uint32_t lane_bits(mask m) { return m ? 1u : 0u; }
 #include "sdf/eval_list.inl"
 #include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::scalar

@@ -19,6 +19,7 @@
 #define both(a, b) ((a) && (b))
 #define either(a, b) ((a) || (b))
 #define no(a) (!(a))
+#define all_of(a) (a)
 #define select(m, a, b) ((m) ? (a) : (b))
 #define whole_of(a) uint(int(a))
 #define real_of(a) float(a)

@@ -45,6 +45,8 @@ KILN_SDF mask ge(real a, real b) { return a >= b; }
 KILN_SDF mask both(mask a, mask b) { return a && b; }
 KILN_SDF mask either(mask a, mask b) { return a || b; }
 KILN_SDF mask no(mask a) { return !a; }
+KILN_SDF bool all_of(mask a) { return a; }
+KILN_SDF uint32_t lane_bits(mask a) { return a ? 1u : 0u; }
 KILN_SDF real select(mask m, real a, real b) { return m ? a : b; }
 KILN_SDF whole select(mask m, whole a, whole b) { return m ? a : b; }
 KILN_SDF real2 select(mask m, real2 a, real2 b) { return m ? a : b; }

@@ -51,6 +51,7 @@ KILN_SDF whole select(mask m, whole a, whole b) { return m.v ? a.v : b.v; }
 
 // x86 min/max return the second operand unless the first is strictly less/greater: with the operands swapped that is
 // the language's rule, ties and signed zeros included.
+// lane_bits(), not a word of the language: lanes where m holds, one bit each.
 // The maskz forms with every lane on are the plain ones without GCC 12's false warning about an undefined operand.
 #if KILN_LANES == 16
 KILN_SDF real min(real a, real b) { return lane_f(_mm512_maskz_min_ps(0xffff, __m512(b.v), __m512(a.v))); }
@@ -60,19 +61,23 @@ KILN_SDF real floor(real a) {
     return lane_f(_mm512_maskz_roundscale_ps(0xffff, __m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC));
 }
 KILN_SDF whole whole_of(real a) { return lane_u(_mm512_maskz_cvttps_epi32(0xffff, __m512(a.v))); }
+KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm512_movepi32_mask(__m512i(m.v))); }
 #elif KILN_LANES == 8
 KILN_SDF real min(real a, real b) { return lane_f(_mm256_min_ps(__m256(b.v), __m256(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm256_max_ps(__m256(b.v), __m256(a.v))); }
 KILN_SDF real sqrt(real a) { return lane_f(_mm256_sqrt_ps(__m256(a.v))); }
 KILN_SDF real floor(real a) { return lane_f(_mm256_floor_ps(__m256(a.v))); }
 KILN_SDF whole whole_of(real a) { return lane_u(_mm256_cvttps_epi32(__m256(a.v))); }
+KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm256_movemask_ps(__m256(m.v))); }
 #else
 KILN_SDF real min(real a, real b) { return lane_f(_mm_min_ps(__m128(b.v), __m128(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm_max_ps(__m128(b.v), __m128(a.v))); }
 KILN_SDF real sqrt(real a) { return lane_f(_mm_sqrt_ps(__m128(a.v))); }
 KILN_SDF real floor(real a) { return lane_f(_mm_floor_ps(__m128(a.v))); }
 KILN_SDF whole whole_of(real a) { return lane_u(_mm_cvttps_epi32(__m128(a.v))); }
+KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm_movemask_ps(__m128(m.v))); }
 #endif
+KILN_SDF bool all_of(mask m) { return lane_bits(m) == (1u << KILN_LANES) - 1; }
 KILN_SDF real abs(real a) { return lane_f(lane_i(a.v) & 0x7fffffff); }
 KILN_SDF real clamp(real x, real lo, real hi) { return min(max(x, lo), hi); }
 KILN_SDF whole bits_of(real a) { return lane_u(a.v); }
