@@ -55,6 +55,19 @@ private:
     int heaviest_slot_ = 0;
 };
 
+// The material of all leaves of `code`, where they have one and the same.
+std::optional<uint16_t> one_material(std::span<const sdf::Instruction> code, const AppendArray<float>& params) {
+    uint32_t out = sdf::kNoMaterial;
+    for (const sdf::Instruction in : code) {
+        if (!in.has_material()) continue;
+        const uint32_t material = uint32_t(params[in.param + 1]);
+        if (material == sdf::kNoMaterial || (out != sdf::kNoMaterial && material != out)) return std::nullopt;
+        out = material;
+    }
+    if (out == sdf::kNoMaterial) return std::nullopt;
+    return uint16_t(out);
+}
+
 uint16_t known(uint16_t id) { return id == sdf::kNoMaterial ? uint16_t(sdf::kDefaultMaterial) : id; }
 
 }  // namespace
@@ -84,7 +97,9 @@ void BrickEvaluator::place(ivec3 first) {
 float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 first) {
     code_ = code;
     place(first);
-    return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
+    const sdf::TapeView tape = sdf::view(*program_, code);
+    cut_ = octants_.cut(tape, x_, y_, z_);
+    return cut_ ? octants_.evaluate(distances_.data()) : sdf::evaluate_brick(tape, x_, y_, z_, distances_.data());
 }
 
 bool BrickEvaluator::keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from) {
@@ -123,23 +138,49 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
     return out;
 }
 
+// Of the texels at hand; where the code is cut up, of the octants that are wanted.
+void BrickEvaluator::mixes(std::array<bool, sdf::OctantCodes::kOctants> wanted, sdf::MaterialMix* out) const {
+    constexpr int kTexels = sdf::OctantCodes::kTexels;
+    float points[3][kBrickTexelCount], values[kBrickTexelCount];
+    const auto place_point = [&](int at, int texel) {
+        points[0][at] = x_[texel & 7];
+        points[1][at] = y_[texel >> 3 & 7];
+        points[2][at] = z_[texel >> 6];
+    };
+    if (!cut_) {
+        for (int i = 0; i < kBrickTexelCount; ++i) place_point(i, i);
+        sdf::evaluate_materials(sdf::view(*program_, code_), {points[0], points[1], points[2], kBrickTexelCount},
+                                values, out);
+        return;
+    }
+    for (int octant = 0; octant < sdf::OctantCodes::kOctants; ++octant) {
+        if (!wanted[size_t(octant)]) continue;
+        const std::span<const sdf::Instruction> code = octants_.material_code(octant);
+        sdf::MaterialMix mixes[kTexels];
+        if (const auto only = one_material(code, program_->params)) {
+            std::fill(std::begin(mixes), std::end(mixes), sdf::MaterialMix{*only});
+        } else {
+            for (int t = 0; t < kTexels; ++t) place_point(t, sdf::texel_of_octant(octant, t));
+            sdf::evaluate_materials(sdf::view(*program_, code), {points[0], points[1], points[2], kTexels}, values,
+                                    mixes);
+        }
+        for (int t = 0; t < kTexels; ++t) out[sdf::texel_of_octant(octant, t)] = mixes[t];
+    }
+}
+
 BrickMaterials BrickEvaluator::materials() const {
     constexpr size_t kTexels = size_t(kBrickTexelCount);
-    thread_local std::vector<float> points(3 * kTexels), values(kTexels);
-    thread_local std::vector<sdf::MaterialMix> mixes(kTexels);
+    const auto in_band = [&](size_t i) { return std::fabs(distances_[i] * voxels_per_metre_) < kBandVoxels; };
+    std::array<bool, sdf::OctantCodes::kOctants> wanted{};
     for (size_t i = 0; i < kTexels; ++i) {
-        points[i] = x_[i & 7];
-        points[kTexels + i] = y_[i >> 3 & 7];
-        points[2 * kTexels + i] = z_[i >> 6];
+        if (in_band(i)) wanted[(i >> 2 & 1) | (i >> 5 & 1) << 1 | (i >> 8 & 1) << 2] = true;
     }
-    sdf::evaluate_materials(sdf::view(*program_, code_),
-                            {points.data(), points.data() + kTexels, points.data() + 2 * kTexels, kBrickTexelCount},
-                            values.data(), mixes.data());
+    thread_local std::vector<sdf::MaterialMix> mixes(kTexels);
+    this->mixes(wanted, mixes.data());
 
     BrickMaterials out;
     thread_local PaletteBuilder palette;
     palette.clear();
-    const auto in_band = [&](size_t i) { return std::fabs(distances_[i] * voxels_per_metre_) < kBandVoxels; };
     for (size_t i = 0; i < kTexels; ++i) {
         if (!in_band(i)) continue;
         const uint32_t second = material_word(0, 0, mixes[i].weight) >> 8;

@@ -8,6 +8,7 @@
 #include "field/codes.gpu.h"
 #include "field/solid.h"
 #include "sdf/eval.h"
+#include "sdf/octants.h"
 
 #include <array>
 #include <cstddef>
@@ -95,11 +96,14 @@ public:
 private:
     void place(ivec3 first);
     BrickMaterials materials() const;
+    void mixes(std::array<bool, sdf::OctantCodes::kOctants> wanted, sdf::MaterialMix* out) const;
 
     const sdf::Program* program_;
     float voxel_size_, voxels_per_metre_;
     vec3 origin_;
     std::span<const sdf::Instruction> code_;
+    mutable sdf::OctantCodes octants_;
+    bool cut_ = false;  // code_ is cut up in octants_
     alignas(64) float x_[kBrickTexels], y_[kBrickTexels], z_[kBrickTexels];
     alignas(64) std::array<float, kBrickTexelCount> distances_;
 };
