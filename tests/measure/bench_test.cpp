@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace kiln::measure {
 namespace {
@@ -145,6 +146,36 @@ TEST(BenchSlow, FlightsMakeNoCellThatDidNotEnterAndEndAsTheyShould) {
     const auto report = run_bench(rows, small({0}));
     ASSERT_TRUE(report) << report.error().message;
     EXPECT_EQ(report->rows.size(), 15u);
+}
+
+void edits_of_scenes_equal_a_rebuild(std::span<const std::string> scenes) {
+    std::vector<std::string> rows;
+    for (const std::string& scene : scenes) {
+        for (const char* what : {"cut", "add", "smooth", "move", "remove"})
+            rows.push_back("edits/" + scene + "." + what);
+    }
+    const auto report = run_bench(rows, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    ASSERT_EQ(report->rows.size(), rows.size());
+    std::set<std::string> checksums;
+    for (size_t i = 0; i < rows.size(); ++i) {
+        const BenchRow& row = report->rows[i];
+        EXPECT_EQ("edits/" + row.name, rows[i]);
+        EXPECT_EQ(row.scene, scenes[i / 5]);
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_EQ(row.unit, "µs");
+        EXPECT_EQ(row.checksum.size(), 16u) << row.name;
+        checksums.insert(row.checksum);
+    }
+    EXPECT_EQ(checksums.size(), rows.size()) << "two changes left the same bricks";
+}
+
+TEST(Bench, EditsOfASceneEndInWhatABuildFromNothingHolds) {
+    edits_of_scenes_equal_a_rebuild(std::vector<std::string>{"workbench"});
+}
+
+TEST(BenchSlow, EditsOfLargeScenesEndInWhatABuildFromNothingHolds) {
+    edits_of_scenes_equal_a_rebuild(std::vector<std::string>{"archipelago", "quarry"});
 }
 
 TEST(Bench, AChecksumFollowsTheSceneAndNothingElse) {
