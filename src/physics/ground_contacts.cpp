@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace kiln::physics {
 
@@ -44,46 +45,87 @@ bool collide_ground(const SdfShape& ground, const Convex& body, const Pose& grou
     return true;
 }
 
-// The ends of a long triangle, the point farthest across it, the one on its other side, and the deepest where it is deeper than those by
-// more than noise.
-void keep_four(std::vector<FieldContact>& contacts) {
-    constexpr float kNoise = 1e-3f;
-    if (contacts.size() <= 4) return;
-    const auto best = [&](auto&& score) {
-        return *std::max_element(contacts.begin(), contacts.end(),
-                                 [&](const FieldContact& a, const FieldContact& b) { return score(a) < score(b); });
-    };
-    FieldContact kept[4];
-    kept[0] = best([](const FieldContact& c) { return c.point.x + 0.37f * c.point.y + 0.61f * c.point.z; });
-    kept[1] = best([&](const FieldContact& c) { return length(c.point - kept[0].point); });
-    const vec3 along = kept[1].point - kept[0].point;
-    kept[2] = best([&](const FieldContact& c) { return length(cross(along, c.point - kept[0].point)); });
-    const vec3 across = cross(along, kept[2].point - kept[0].point);
-    // On the other side of the line.
-    kept[3] = best([&](const FieldContact& c) { return -dot(across, cross(along, c.point - kept[0].point)); });
-    const FieldContact deepest = best([](const FieldContact& c) { return c.depth; });
-    FieldContact* shallow = std::min_element(
-        kept, kept + 4, [](const FieldContact& a, const FieldContact& b) { return a.depth < b.depth; });
-    if (deepest.depth > std::max({kept[0].depth, kept[1].depth, kept[2].depth, kept[3].depth}) + kNoise)
-        *shallow = deepest;
-    contacts.assign(kept, kept + 4);
-}
-
 // Of many triangles only those that touch as much as the nearest does say where a body rests.
 static void drop_far(std::vector<FieldContact>& contacts) {
-    constexpr float kNear = 5e-3f;  // metres
+    constexpr float kNear = 0.5f * kMargin;
     float deepest = -1e30f;
     for (const FieldContact& c : contacts) deepest = std::max(deepest, c.depth);
     std::erase_if(contacts, [&](const FieldContact& c) { return c.depth < std::min(deepest, 0.0f) - kNear; });
 }
 
+// Each to the deepest point of the body near it: which triangles it was found on would have an edge of a box tremble. On a face that lies
+// flat it stays, however little the face leans: steps are half a voxel.
+static void sink(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
+                 std::vector<FieldContact>& contacts) {
+    constexpr int kSteps = 4;
+    const Pose body_from_ground = inverse(ground_from_body);
+    const float half_voxel = 0.5f * ground.regions()->side() / float(kRegionCells * field::kBrickVoxels);
+    static thread_local std::vector<FieldContact> next;
+    for (FieldContact& c : contacts) {
+        float step = half_voxel;
+        for (int i = 0; i < kSteps; ++i) {
+            const vec3 down = direction_into(ground_from_body, -c.normal);
+            next.assign(1, c);
+            next.front().point = ground_from_body * project(body, body_from_ground * c.point + down * step);
+            measure(ground, margin, next);
+            if (!next.empty() && next.front().depth > c.depth) {
+                c = next.front();
+            } else {
+                step *= 0.25f;
+            }
+        }
+    }
+}
+
+static void one_of_each_place(std::vector<FieldContact>& contacts, float radius) {
+    size_t kept = 0;
+    for (const FieldContact& c : contacts) {
+        size_t i = 0;
+        while (i < kept && (length(contacts[i].point - c.point) > kSamePlace * radius ||
+                            dot(contacts[i].normal, c.normal) < kSameNormal))
+            ++i;
+        if (i == kept) {
+            contacts[kept++] = c;
+        } else if (c.depth > contacts[i].depth) {
+            contacts[i] = c;
+        }
+    }
+    contacts.resize(kept);
+}
+
+// Some of them, as far from each other as can be, the deepest first.
+static void spread(std::vector<FieldContact>& contacts) {
+    constexpr size_t kMost = 12;
+    if (contacts.size() <= kMost) return;
+    static thread_local std::vector<float> nearest;
+    nearest.assign(contacts.size(), std::numeric_limits<float>::infinity());
+    const auto deepest =
+        std::max_element(contacts.begin(), contacts.end(),
+                         [](const FieldContact& a, const FieldContact& b) { return a.depth < b.depth; });
+    std::iter_swap(contacts.begin(), deepest);
+    for (size_t kept = 1; kept < kMost; ++kept) {
+        size_t best = kept;
+        for (size_t i = kept; i < contacts.size(); ++i) {
+            nearest[i] = std::min(nearest[i], length(contacts[i].point - contacts[kept - 1].point));
+            if (nearest[i] > nearest[best]) best = i;
+        }
+        std::swap(contacts[kept], contacts[best]);
+        std::swap(nearest[kept], nearest[best]);
+    }
+    contacts.resize(kMost);
+}
+
 void settle_on_triangles(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
                          std::vector<FieldContact>& contacts) {
     drop_far(contacts);
-    keep_four(contacts);
+    spread(contacts);
     measure(ground, margin, contacts);
-    if (body.kind == Convex::Kind::Sphere)
+    if (body.kind == Convex::Kind::Sphere) {
         settle_ball(ground, ground_from_body.position, body.size.x, margin, contacts);
+    } else {
+        sink(ground, body, ground_from_body, margin, contacts);
+        one_of_each_place(contacts, outer_radius(body));
+    }
 }
 
 bool is_own(const RegionMesh& mesh, vec3 p) { return mesh.box().inflated(kBorder * mesh.cell).contains(p); }

@@ -19,11 +19,8 @@ Box3 box_of(const Convex& body, const Pose& pose);
 bool collide_ground(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
                     std::vector<FieldContact>& out);
 
-/// The four that hold a body as all of them do: the same ones while nothing moves, since what rests on others in each step trembles.
-void keep_four(std::vector<FieldContact>& contacts);
-
-/// Of contacts found on triangles, those that say where the body rests. Where it rests is said by triangles, how deep and which way by the
-/// field: facets would have a ball roll by steps.
+/// Of contacts found on triangles, up to a dozen that say where the body rests, each at the deepest point near it: where it rests is said by
+/// triangles, how deep and which way by the field. Facets would have a ball roll by steps, and a box on its edges tremble.
 void settle_on_triangles(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
                          std::vector<FieldContact>& contacts);
 

@@ -21,14 +21,12 @@ constexpr int kShellSteps = 8;
 // Of the distance of shell points: a step that gains less ends a walk. What is at least half as thick as it is wide rolls on what stands:
 // with its lowest point, to a fortieth of that distance, it neither sinks nor is slowed.
 constexpr float kEnoughRolling = 1e-5f, kEnoughOtherwise = 1e-3f, kThick = 0.5f;
-constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
-constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
-constexpr float kTouch = 0.25f;        // of the margin: apart by no more counts as lying on it
-constexpr size_t kAlong = 7;           // points looked at on an edge whose ends do not touch
-constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
-constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
-constexpr float kSteep = 0.8f;         // gradients above are of one place of the surface
-constexpr float kLeastSlope = 0.25f;   // gradients below are not trusted to tell how far the surface is
+constexpr size_t kMostSeeds = 9;      // as many as ProgramField asks at once
+constexpr int kBisections = 6;        // of an edge that leaves the solid: to 1/64 of its length
+constexpr float kTouch = 0.25f;       // of the margin: apart by no more counts as lying on it
+constexpr size_t kAlong = 7;          // points looked at on an edge whose ends do not touch
+constexpr float kSteep = 0.8f;        // gradients above are of one place of the surface
+constexpr float kLeastSlope = 0.25f;  // gradients below are not trusted to tell how far the surface is
 
 struct Probe {
     vec3 p;       // in the field

@@ -21,6 +21,32 @@ namespace {
 // Bullet's tree of boxes wants finite ones; a kilometre-sized number of them keeps their area finite in floats.
 constexpr float kWorldSize = 1e5f;
 
+// Bullet keeps four points of a pair between steps, with their impulses. Offered more, it drops others each time, and what rests
+// trembles. So the same four are chosen while nothing moves: the ends of a long triangle, the point farthest across it, and the deepest
+// where it is deeper than those by more than noise.
+void keep_four(std::vector<FieldContact>& contacts) {
+    constexpr float kNoise = 1e-3f;
+    if (contacts.size() <= 4) return;
+    const auto best = [&](auto&& score) {
+        return *std::max_element(contacts.begin(), contacts.end(),
+                                 [&](const FieldContact& a, const FieldContact& b) { return score(a) < score(b); });
+    };
+    FieldContact kept[4];
+    kept[0] = best([](const FieldContact& c) { return c.point.x + 0.37f * c.point.y + 0.61f * c.point.z; });
+    kept[1] = best([&](const FieldContact& c) { return length(c.point - kept[0].point); });
+    const vec3 along = kept[1].point - kept[0].point;
+    kept[2] = best([&](const FieldContact& c) { return length(cross(along, c.point - kept[0].point)); });
+    const vec3 across = cross(along, kept[2].point - kept[0].point);
+    // On the other side of the line.
+    kept[3] = best([&](const FieldContact& c) { return -dot(across, cross(along, c.point - kept[0].point)); });
+    const FieldContact deepest = best([](const FieldContact& c) { return c.depth; });
+    FieldContact* shallow = std::min_element(
+        kept, kept + 4, [](const FieldContact& a, const FieldContact& b) { return a.depth < b.depth; });
+    if (deepest.depth > std::max({kept[0].depth, kept[1].depth, kept[2].depth, kept[3].depth}) + kNoise)
+        *shallow = deepest;
+    contacts.assign(kept, kept + 4);
+}
+
 // One pair of bodies, as long as their boxes meet. The manifold keeps up to four points between steps, with their impulses.
 class SdfAlgorithm : public btCollisionAlgorithm {
 public:
