@@ -345,6 +345,20 @@ void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_
     out.resize(few);
 }
 
+// One that is in the other with its middle has surface on all sides that is pushed out, each its own way, and would be held there. It goes
+// out whole, the way its middle does.
+void push_out_whole(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, std::vector<FieldContact>& contacts) {
+    vec3 middle = b_from_a * a.mass().center, way;
+    if (b.field().distance(middle, way) > 0) {
+        if (!b.moves()) return;
+        middle = b.mass().center;
+        if (a.field().distance(inverse(b_from_a) * middle, way) > 0) return;
+        way = -rotate(b_from_a.rotation, way);
+    }
+    const float slope = length(way);
+    if (slope > 1e-4f) contacts.assign(1, {middle, way / slope, kMostDepth});
+}
+
 }  // namespace
 
 void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float margin, std::vector<FieldContact>& out) {
@@ -438,6 +452,7 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
         out.push_back(c.contact);
         if (out.size() == kMostContacts) break;
     }
+    if (!out.empty() && !(out.front().depth < kMostDepth)) push_out_whole(a, b, b_from_a, out);
 }
 
 std::optional<FieldHit> cast_ray(const field::SdfField& field, vec3 origin, vec3 way, float most) {
