@@ -138,7 +138,8 @@ Result<void> Simulation::reshape(Recut cut) {
     const vec3 middle = pose * world_->center_of_mass(members_[cut.member].body);
     const std::string own = members_[cut.member].id;
     std::vector<field::LoosePart> parts =
-        field::loose_parts(*cut.before, *cut.after, cut.changed, {.voxel_size = voxel_size_, .least_points = 1});
+        field::loose_parts(*cut.before, *cut.after, cut.changed,
+                           {.voxel_size = voxel_size_, .least_points = 1, .workers = settings_.threads});
     bool split = false;
     for (const field::LoosePart& part : parts) {
         const std::vector<const Edit*> edits = pointers(cut.edits);
