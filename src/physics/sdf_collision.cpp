@@ -345,8 +345,8 @@ void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_
     out.resize(few);
 }
 
-// One that is in the other with its middle has surface on all sides that is pushed out, each its own way, and would be held there. It goes
-// out whole, the way its middle does.
+// One that is in the other with its middle may have surface on all sides that is pushed out, each its own way, and would be held there. Then
+// it goes out whole, the way its middle does.
 void push_out_whole(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, std::vector<FieldContact>& contacts) {
     vec3 middle = b_from_a * a.mass().center, way;
     if (b.field().distance(middle, way) > 0) {
@@ -356,7 +356,9 @@ void push_out_whole(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, 
         way = -rotate(b_from_a.rotation, way);
     }
     const float slope = length(way);
-    if (slope > 1e-4f) contacts.assign(1, {middle, way / slope, kMostDepth});
+    const bool agree =
+        std::all_of(contacts.begin(), contacts.end(), [&](const FieldContact& c) { return dot(c.normal, way) > 0; });
+    if (slope > 1e-4f && !agree) contacts.assign(1, {middle, way / slope, kMostDepth});
 }
 
 }  // namespace
