@@ -2,7 +2,10 @@
 
 #include "field/loose.h"
 
+#include "field/brick.gpu.h"
 #include "field/trilinear.gpu.h"
+
+#include "base/parallel_for.h"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +13,7 @@
 #include <cstdlib>
 #include <numeric>
 #include <unordered_map>
+#include <utility>
 
 namespace kiln::field {
 
@@ -43,28 +47,38 @@ public:
         const int i = ((p.z & 7) << 6) | ((p.y & 7) << 3) | (p.x & 7);
         return (it->second[size_t(i >> 6)] >> (i & 63) & 1u) != 0;
     }
+    /// Asks for a box of points at once.
+    void look(ivec3 first, ivec3 size, int workers) {
+        std::vector<std::pair<ivec3, Bits*>> blocks;
+        const ivec3 last = first + size - ivec3{1, 1, 1};
+        for (int z = first.z >> 3; z <= last.z >> 3; ++z)
+            for (int y = first.y >> 3; y <= last.y >> 3; ++y)
+                for (int x = first.x >> 3; x <= last.x >> 3; ++x)
+                    if (auto [it, fresh] = blocks_.try_emplace(key_of({x, y, z})); fresh)
+                        blocks.push_back({{x, y, z}, &it->second});  // a map's places stay
+        parallel_for(blocks.size(), workers, [&](int i) { fill(blocks[size_t(i)].first, *blocks[size_t(i)].second); });
+    }
 
 private:
     using Bits = std::array<uint64_t, 8>;
     void fill(ivec3 block, Bits& bits) const {
-        std::array<float, 64> x, y, z, d;
-        const ivec3 first{block.x * 8, block.y * 8, block.z * 8};
+        static_assert(kBrickTexels == 8);
+        float x[8], y[8], z[8];
+        std::array<float, 512> d;
+        const vec3 low = place_of({block.x * 8, block.y * 8, block.z * 8}, h_);
+        for (int i = 0; i < 8; ++i) {
+            x[i] = float(block.x * 8 + i) * h_;
+            y[i] = float(block.y * 8 + i) * h_;
+            z[i] = float(block.z * 8 + i) * h_;
+        }
+        const vec3 center = low + vec3{3.5f * h_, 3.5f * h_, 3.5f * h_};
         bits = {};
-        // One question where all of it is on one side.
-        const vec3 center = place_of(first, h_) + vec3{3.5f * h_, 3.5f * h_, 3.5f * h_};
-        if (const float d0 = field_.distance(center); std::abs(d0) > 6.1f * h_) {
-            if (d0 < 0) bits.fill(~uint64_t(0));
+        if (!field_.texels(center, 7 * h_, 0, x, y, z, d.data())) {  // all of it is on one side
+            if (field_.distance(center) < 0) bits.fill(~uint64_t(0));
             return;
         }
-        for (int k = 0; k < 8; ++k) {
-            for (int i = 0; i < 64; ++i) {
-                const vec3 p = place_of({first.x + (i & 7), first.y + (i >> 3), first.z + k}, h_);
-                x[size_t(i)] = p.x, y[size_t(i)] = p.y, z[size_t(i)] = p.z;
-            }
-            field_.distances({x.data(), y.data(), z.data(), 64}, d.data());
-            for (int i = 0; i < 64; ++i)
-                if (d[size_t(i)] <= 0) bits[size_t(k)] |= uint64_t(1) << i;
-        }
+        for (size_t i = 0; i < d.size(); ++i)
+            if (d[i] <= 0) bits[i >> 6] |= uint64_t(1) << (i & 63);
     }
     const SdfField& field_;
     float h_;
@@ -190,6 +204,8 @@ std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after
                p.z < first.z + size.z;
     };
     Solid was(before, h), is(after, h);
+    was.look(first, size, options.workers);
+    is.look(first, size, options.workers);
     std::vector<uint8_t> state(count);  // bit 0: was solid, bit 1: is
     bool removed = false;
     const auto each = [&](auto&& visit) {

@@ -52,6 +52,7 @@ struct LooseOptions {
     size_t most_looked_at =
         1 << 22;              ///< lattice points of the change; larger ones (and endless ones) cut nothing loose
     size_t least_points = 8;  ///< smaller parts are crumbs: they go with the world
+    int workers = 0;          ///< threads that look at the change, 0 for every core
 };
 /// The largest of the parts that were one before stays. By place: the part with the least first point first.
 std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after, const Box3& changed,

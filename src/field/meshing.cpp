@@ -14,10 +14,6 @@ namespace {
 
 constexpr int kRowGrain = 4;
 
-// Vertices keep this far from the ends of their edge, in voxels: no two share a position, and no triangle is degenerate, where a
-// texel is exactly 0.
-constexpr float kLeastFraction = 1.0f / 256;
-
 // A voxel's triangles as places in EdgeNumbers.
 struct Row {
     uint16_t count;  // numbers, 3 a triangle

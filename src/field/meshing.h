@@ -11,6 +11,10 @@
 
 namespace kiln::field {
 
+/// Vertices keep this far from the ends of their edge, or the faces of their voxel, in voxels: no two share a position, and no triangle is
+/// degenerate, where a texel is exactly 0.
+inline constexpr float kLeastFraction = 1.0f / 256;
+
 /// Marching cubes: a vertex on each crossed lattice edge, where the stored values vanish linearly. A pure function of the edge's two
 /// texels and its place, so two regions that share a face have the same vertices on it, bit for bit.
 void mesh_smooth(const MeshBricks& bricks, Mesh& out, int workers = 0);

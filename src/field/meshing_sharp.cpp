@@ -25,11 +25,10 @@ float4 all_of(float v) { return float4{v, v, v, v}; }
 Crossing crossing(vec3 normal, float t) { return Crossing{normal.x, normal.y, normal.z, t}; }
 
 constexpr int kRootSteps = 8;
-constexpr float kRootTolerance = 1e-3f;       // voxels
-constexpr float kNewtonReach = 0.1f;          // voxels off the surface from which one step by the gradient lands on it
-constexpr float kGradientStep = 1.0f / 40;    // voxels an axis; a float's rounding at 1000 voxels is 6e-5
-constexpr float kLeastFraction = 1.0f / 256;  // vertices stay this far inside their voxel: no two share a position
-constexpr float kStill = 0.005f;              // voxels off the surface that need no second look
+constexpr float kRootTolerance = 1e-3f;     // voxels
+constexpr float kNewtonReach = 0.1f;        // voxels off the surface from which one step by the gradient lands on it
+constexpr float kGradientStep = 1.0f / 40;  // voxels an axis; a float's rounding at 1000 voxels is 6e-5
+constexpr float kStill = 0.005f;            // voxels off the surface that need no second look
 // Of the squared distances to the planes, how much is added for the distance to their middle: planes that agree leave a vertex
 // there, planes that differ by more than about 10 degrees meet where they should.
 constexpr float kMiddleWeight = 0.004f;

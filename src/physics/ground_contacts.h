@@ -19,6 +19,11 @@ Box3 box_of(const Convex& body, const Pose& pose);
 bool collide_ground(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
                     std::vector<FieldContact>& out);
 
+/// Of contacts found on triangles, up to a dozen that say where the body rests, each at the deepest point near it: where it rests is said by
+/// triangles, how deep and which way by the field. Facets would have a ball roll by steps, and a box on its edges tremble.
+void settle_on_triangles(const SdfShape& ground, const Convex& body, const Pose& ground_from_body, float margin,
+                         std::vector<FieldContact>& contacts);
+
 /// Whether a contact on a mesh is its own, not one on its apron.
 bool is_own(const RegionMesh& mesh, vec3 p);
 

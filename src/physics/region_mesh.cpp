@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 namespace kiln::physics {
 
@@ -65,6 +66,65 @@ std::vector<Brick> bricks_of(const field::SdfField& exact, float h, ivec3 region
     return out;
 }
 
+// The lattice edge that a vertex lies on, by its place in voxels: the axis it is along, its lower end as a texel of the brick.
+struct LatticeEdge {
+    int axis;
+    size_t low;
+};
+// None so far out that places are no finer than the ends of an edge: a matter of the place alone.
+std::optional<LatticeEdge> edge_at(const std::array<double, 3>& at, ivec3 cell) {
+    constexpr double kOff =
+        0.5 * double(field::kLeastFraction);  // voxels: what is farther off the lattice is on its edge's way
+    const std::array<int, 3> first{cell.x * kVoxels, cell.y * kVoxels, cell.z * kVoxels};
+    LatticeEdge out{-1, 0};
+    for (int k = 2; k >= 0; --k) {
+        const double v = at[size_t(k)];
+        const bool along = std::abs(v - std::round(v)) > kOff;
+        if (along && out.axis >= 0) return {};
+        if (along) out.axis = k;
+        const double texel = (along ? std::floor(v) : std::round(v)) - first[size_t(k)];
+        if (!(texel >= 0 && texel < kTexels - along)) return {};
+        out.low = out.low * kTexels + size_t(texel);
+    }
+    return out.axis < 0 ? std::nullopt : std::optional(out);
+}
+
+// Where the field itself is 0 on an edge, not what its ends let one think: straight between them, a ball of eight voxels' radius would be
+// off by h²/8R, a 64th of a voxel, and the edge of a box by a third. One step of regula falsi; the vertex stays between the ends, so what
+// is closed stays so. A matter of the place and of the field alone: regions that share an edge move its vertex alike.
+void lay_on_surface(const field::SdfField& exact, float h, const field::MeshBricks& bricks, field::Mesh& mesh) {
+    std::vector<float> x, y, z, d;
+    for (size_t b = 0; b < bricks.bricks().size(); ++b) {
+        const field::MeshBrick& brick = bricks.bricks()[b];
+        vec3* const vertices = mesh.positions.data() + mesh.brick_vertices[b];
+        const size_t count = mesh.brick_vertices[b + 1] - mesh.brick_vertices[b];
+        x.resize(count), y.resize(count), z.resize(count), d.resize(count);
+        for (size_t i = 0; i < count; ++i) x[i] = vertices[i].x, y[i] = vertices[i].y, z[i] = vertices[i].z;
+        exact.distances(sdf::Points{x.data(), y.data(), z.data(), int(count)}, d.data());
+        const auto value = [&](size_t texel) {
+            uint16_t code;
+            std::memcpy(&code, brick.codes + texel * sizeof code, sizeof code);
+            return field::half_value(code);
+        };
+        for (size_t i = 0; i < count; ++i) {
+            const std::array<double, 3> at{x[i] / double(h), y[i] / double(h), z[i] / double(h)};
+            const auto edge = edge_at(at, brick.cell);
+            if (!edge) continue;
+            constexpr size_t kStep[3] = {1, kTexels, size_t(kTexels) * kTexels};
+            const double along = at[size_t(edge->axis)];
+            const float whole = float(std::floor(along)), t = float(along - std::floor(along)), here = d[i] / h;
+            // From the end that is on the other side.
+            const float low = value(edge->low), high = value(edge->low + kStep[edge->axis]);
+            const bool from_low = (low <= 0) != (here <= 0);
+            const float end = from_low ? low : high, end_at = from_low ? 0.0f : 1.0f;
+            if ((end <= 0) == (here <= 0)) continue;
+            const float zero = end_at + (t - end_at) * (end / (end - here));
+            const float moved = (whole + std::clamp(zero, field::kLeastFraction, 1 - field::kLeastFraction)) * h;
+            (edge->axis == 0 ? vertices[i].x : edge->axis == 1 ? vertices[i].y : vertices[i].z) = moved;
+        }
+    }
+}
+
 }  // namespace
 
 uint64_t region_key(ivec3 r) {
@@ -88,7 +148,9 @@ std::shared_ptr<RegionMesh> mesh_region(const field::SdfField& exact, float voxe
     views.reserve(bricks.size());
     for (const Brick& b : bricks) views.push_back({b.cell, 0, reinterpret_cast<const std::byte*>(b.codes.data())});
     field::Mesh mesh;
-    field::mesh_smooth(field::MeshBricks(std::move(views), field::DistanceFormat::Half, voxel_size), mesh, 1);
+    const field::MeshBricks sorted(std::move(views), field::DistanceFormat::Half, voxel_size);
+    field::mesh_smooth(sorted, mesh, 1);
+    lay_on_surface(exact, voxel_size, sorted, mesh);
     out->vertices.assign(mesh.positions.data(), mesh.positions.data() + mesh.positions.size());
 
     // By bricks, counted and then placed. Whose a triangle is, its middle says: of the same three vertices it is the same for all.

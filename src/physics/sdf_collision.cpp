@@ -21,14 +21,12 @@ constexpr int kShellSteps = 8;
 // Of the distance of shell points: a step that gains less ends a walk. What is at least half as thick as it is wide rolls on what stands:
 // with its lowest point, to a fortieth of that distance, it neither sinks nor is slowed.
 constexpr float kEnoughRolling = 1e-5f, kEnoughOtherwise = 1e-3f, kThick = 0.5f;
-constexpr size_t kMostSeeds = 9;       // as many as ProgramField asks at once
-constexpr int kBisections = 6;         // of an edge that leaves the solid: to 1/64 of its length
-constexpr float kTouch = 0.25f;        // of the margin: apart by no more counts as lying on it
-constexpr size_t kAlong = 7;           // points looked at on an edge whose ends do not touch
-constexpr float kSamePlace = 0.02f;    // of the body's radius: two contacts nearer than that are one
-constexpr float kSameNormal = 0.996f;  // cosine of 5 degrees
-constexpr float kSteep = 0.8f;         // gradients above are of one place of the surface
-constexpr float kLeastSlope = 0.25f;   // gradients below are not trusted to tell how far the surface is
+constexpr size_t kMostSeeds = 9;      // as many as ProgramField asks at once
+constexpr int kBisections = 6;        // of an edge that leaves the solid: to 1/64 of its length
+constexpr float kTouch = 0.25f;       // of the margin: apart by no more counts as lying on it
+constexpr size_t kAlong = 7;          // points looked at on an edge whose ends do not touch
+constexpr float kSteep = 0.8f;        // gradients above are of one place of the surface
+constexpr float kLeastSlope = 0.25f;  // gradients below are not trusted to tell how far the surface is
 
 struct Probe {
     vec3 p;       // in the field
@@ -347,6 +345,22 @@ void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_
     out.resize(few);
 }
 
+// One that is in the other with its middle may have surface on all sides that is pushed out, each its own way, and would be held there. Then
+// it goes out whole, the way its middle does.
+void push_out_whole(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, std::vector<FieldContact>& contacts) {
+    vec3 middle = b_from_a * a.mass().center, way;
+    if (b.field().distance(middle, way) > 0) {
+        if (!b.moves()) return;
+        middle = b.mass().center;
+        if (a.field().distance(inverse(b_from_a) * middle, way) > 0) return;
+        way = -rotate(b_from_a.rotation, way);
+    }
+    const float slope = length(way);
+    const bool agree =
+        std::all_of(contacts.begin(), contacts.end(), [&](const FieldContact& c) { return dot(c.normal, way) > 0; });
+    if (slope > 1e-4f && !agree) contacts.assign(1, {middle, way / slope, kMostDepth});
+}
+
 }  // namespace
 
 void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float margin, std::vector<FieldContact>& out) {
@@ -440,6 +454,7 @@ void collide(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, float m
         out.push_back(c.contact);
         if (out.size() == kMostContacts) break;
     }
+    if (!out.empty() && !(out.front().depth < kMostDepth)) push_out_whole(a, b, b_from_a, out);
 }
 
 std::optional<FieldHit> cast_ray(const field::SdfField& field, vec3 origin, vec3 way, float most) {

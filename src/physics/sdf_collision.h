@@ -29,6 +29,8 @@ inline float reach_of(float way) { return way < kMargin ? kMargin : way < kMostR
 /// Contacts deeper than this say this: a body that was built over is pushed out at a walking pace, not shot out.
 inline constexpr float kMostDepth = 0.2f;
 inline constexpr size_t kMostContacts = 24;
+/// Two contacts nearer than this share of the body's radius, with normals whose cosine is larger (5 degrees), are one.
+inline constexpr float kSamePlace = 0.02f, kSameNormal = 0.996f;
 
 /// Contacts no farther apart than `margin`, deepest of each place first.
 void collide(const field::SdfField& field, const Convex& body, const Pose& field_from_body, float margin,

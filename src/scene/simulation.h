@@ -156,6 +156,8 @@ private:
     Result<void> change_own(const std::string& name, const Edit& edit);
     Result<void> hide(const Member& m);
     Result<void> show(Member& m);
+    Result<void> hide_mesh(const Member& m);
+    Result<void> show_instead_of_mesh(Member& m, const std::string& object_name);
     /// A command for the world, for bodies or for both; `apply` gives the world its part.
     Result<void> obey(const std::string& text, const std::string& name,
                       const std::function<Result<void>(World&, const std::string&)>& apply);

@@ -138,7 +138,8 @@ Result<void> Simulation::reshape(Recut cut) {
     const vec3 middle = pose * world_->center_of_mass(members_[cut.member].body);
     const std::string own = members_[cut.member].id;
     std::vector<field::LoosePart> parts =
-        field::loose_parts(*cut.before, *cut.after, cut.changed, {.voxel_size = voxel_size_, .least_points = 1});
+        field::loose_parts(*cut.before, *cut.after, cut.changed,
+                           {.voxel_size = voxel_size_, .least_points = 1, .workers = settings_.threads});
     bool split = false;
     for (const field::LoosePart& part : parts) {
         const std::vector<const Edit*> edits = pointers(cut.edits);
@@ -214,18 +215,33 @@ Result<void> Simulation::hide(const Member& m) {
         edit.hidden = true;
         if (auto done = change_own(name, edit); !done) return done;
     }
+    return hide_mesh(m);
+}
+
+Result<void> Simulation::hide_mesh(const Member& m) {
+    const SceneData& data = live_->impl_->data;
+    const auto body =
+        std::find_if(data.bodies.begin(), data.bodies.end(), [&](const SceneBody& b) { return b.id == m.id; });
+    if (body == data.bodies.end() || body->mesh.empty()) return {};
+    SceneData now;
+    now.meshes = data.meshes;
+    for (SceneMesh& mesh : now.meshes) mesh.hidden = mesh.hidden || mesh.id == body->mesh;
+    std::string text = write_command(now, {}, {.kind = CommandKind::Meshes});
+    if (text == write_command(data, {}, {.kind = CommandKind::Meshes})) return {};
+    if (auto applied = live_->apply(text, "a mesh that was cut"); !applied) return applied;
+    made_.push_back(std::move(text));
     return {};
 }
 
 Result<void> Simulation::show(Member& m) {
     const std::vector<std::string> names = edits_of(m);
-    if (names.empty()) return {};  // of a mesh, which pictures show whole
     std::string object_name;
     do object_name = formatted("{}.{}", m.id, ++m.cuts);
     while (live_->impl_->data.object_numbers.contains(object_name));
     const std::vector<const Edit*> edits = pointers(m.edits);
     const Object object = object_of(object_name, edits);
     if (auto done = change({.kind = CommandKind::Object, .id = object_name, .object = &object}); !done) return done;
+    if (names.empty()) return show_instead_of_mesh(m, object_name);
     for (const std::string& name : names) {
         Edit edit = *live_->find(*live_->find_edit(name));
         if (name == names.front()) {
@@ -245,6 +261,27 @@ Result<void> Simulation::show(Member& m) {
         if (auto done = change_own(name, edit); !done) return done;
     }
     return {};
+}
+
+// What is left of a body that a mesh was is seen as the solid that it is, and the mesh is hidden.
+Result<void> Simulation::show_instead_of_mesh(Member& m, const std::string& object_name) {
+    SceneData& data = live_->impl_->data;
+    const physics::Pose pose = state(m).pose;
+    Edit placed;
+    placed.name = object_name;
+    for (int i = 2; live_->find_edit(placed.name); ++i) placed.name = formatted("{}.{}", object_name, i);
+    placed.node.kind = Node::Kind::Object;
+    placed.node.object = {data.object_numbers.find(object_name)->second, 0};
+    placed.node.transform.position = pose.position;
+    placed.node.transform.rotation = pose.rotation;
+    placed.dynamic = true;
+    owned_.insert(placed.name);
+    for (SceneBody& b : data.bodies)
+        if (b.id == m.id) b.edits = {placed.name};
+    if (auto done = change({.kind = CommandKind::Add, .edit = &placed}); !done) return done;
+    m.edit = placed.name;
+    m.began = pose;
+    return hide_mesh(m);
 }
 
 // Parts too small to be bodies: they are seen to fall, and counted.

@@ -25,9 +25,10 @@ std::vector<SceneMesh> Simulation::meshes_now() const {
     for (size_t i = 0; i < bodies.size(); ++i) {
         const Member& m = members_[i];
         const physics::Pose pose = state(m).pose;
-        if (bodies[i].mesh.empty() || pose == m.began) continue;
+        if (bodies[i].mesh.empty() || (m.edit.empty() && pose == m.began)) continue;
         for (SceneMesh& mesh : out) {
             if (mesh.id != bodies[i].mesh) continue;
+            mesh.hidden = mesh.hidden || !m.edit.empty() || m.gone;
             mesh.transform.position = without_minus_zero(pose.position);
             mesh.transform.rotation = pose.rotation;
         }
@@ -46,7 +47,12 @@ std::vector<SceneBody> Simulation::bodies_now() const {
     };
     const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
     for (size_t i = 0; i < bodies.size(); ++i)
-        if (!members_[i].gone && !members_[i].rest) moving(bodies[i], members_[i]);
+        if (!members_[i].gone && !members_[i].rest) {
+            SceneBody body = bodies[i];
+            // Cut, it is its solid.
+            if (!body.mesh.empty() && !members_[i].edit.empty()) body.edits = {members_[i].edit}, body.mesh.clear();
+            moving(std::move(body), members_[i]);
+        }
     for (const Part& part : loose_) {
         if (part.member < bodies.size()) continue;
         const Member& m = members_[part.member];
@@ -105,10 +111,13 @@ Result<void> Simulation::keep_motion(World& world) const {
         return world.change(*id, edit);
     };
     const std::vector<SceneBody>& bodies = start_.impl_->data.bodies;
-    for (size_t i = 0; i < bodies.size(); ++i)
-        for (const std::string& name : bodies[i].edits)
-            if (!members_[i].gone && !members_[i].rest)
-                if (auto done = put(members_[i], name); !done) return done;
+    for (size_t i = 0; i < bodies.size(); ++i) {
+        if (members_[i].gone || members_[i].rest) continue;
+        std::vector<std::string> names = bodies[i].edits;
+        if (!bodies[i].mesh.empty() && !members_[i].edit.empty()) names = {members_[i].edit};
+        for (const std::string& name : names)
+            if (auto done = put(members_[i], name); !done) return done;
+    }
     for (const Part& part : loose_)
         if (part.member >= bodies.size())
             if (auto done = put(members_[part.member], members_[part.member].edit); !done) return done;

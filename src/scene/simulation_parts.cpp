@@ -46,8 +46,8 @@ Result<void> Simulation::change_ground() {
     const std::shared_ptr<const field::ProgramField> before = ground_;
     if (auto done = set_ground(*box); !done) return done;
     Box3 cut;
-    const std::vector<field::LoosePart> parts =
-        field::loose_parts(*before, *ground_, *box, {.voxel_size = voxel_size_, .least_points = 1});
+    const std::vector<field::LoosePart> parts = field::loose_parts(
+        *before, *ground_, *box, {.voxel_size = voxel_size_, .least_points = 1, .workers = settings_.threads});
     const sdf::Program& program = ground_->program();
     for (const field::LoosePart& part : parts) {
         if (!region_fits(part.region.size)) continue;  // too wide for a region: it stays

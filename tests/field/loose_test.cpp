@@ -40,6 +40,17 @@ TEST(LooseParts, ThePartOfAPillarAboveACutIsLooseAndTheRestStays) {
     EXPECT_NEAR(double(parts[0].points) * std::pow(double(kVoxel), 3), 0.6 * 0.6 * 1.4, 0.12);
 }
 
+TEST(LooseParts, AnyNumberOfWorkersFindsTheSamePoints) {
+    const vec3 at{0, 2, 0}, half{1, 0.1f, 1};
+    const auto one = cut(kPillar, slab(at, half), around(at, half), {.workers = 1});
+    ASSERT_EQ(one.size(), 1u);
+    for (const int workers : {2, 3, 8}) {
+        const auto many = cut(kPillar, slab(at, half), around(at, half), {.workers = workers});
+        ASSERT_EQ(many.size(), 1u) << workers;
+        EXPECT_EQ(many[0].region.inside, one[0].region.inside) << workers;
+    }
+}
+
 TEST(LooseParts, ANotchThatDoesNotGoThroughCutsNothingLoose) {
     const vec3 at{0.4f, 2, 0}, half{0.5f, 0.1f, 1};
     EXPECT_TRUE(cut(kPillar, slab(at, half), around(at, half)).empty());

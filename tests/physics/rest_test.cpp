@@ -106,51 +106,60 @@ TEST_P(AtRest, OnBricksItIsWhereItIsOnTheExactFieldWithinAQuarterVoxel) {
 }
 
 TEST_P(AtRest, AStackOfTenBoxesStands) {
-    Scene s(GetParam());
-    s.ground({edit(Plane{})});
-    std::vector<BodyId> boxes;
-    for (int i = 0; i < 10; ++i)
-        boxes.push_back(s.add({.shape = Convex::box({0.5f, 0.5f, 0.5f}), .pose = {{0, 0.5f + float(i), 0}, {}}}));
-    s.run(10);
-    for (const BodyId id : boxes) {
-        const BodyState state = s.world->state(id);
-        EXPECT_LT(std::hypot(state.pose.position.x, state.pose.position.z), 0.05f);
-        EXPECT_TRUE(state.asleep);
+    for (const bool as_field : {false, true}) {
+        // On Bullet ten fields stand, but sway by 0.15 m and do not sleep.
+        if (as_field && GetParam() == "bullet") continue;
+        Scene s(GetParam());
+        s.ground({edit(Plane{})});
+        const Solid box = solids()[1];
+        const BodyShape shape = as_field ? box.field() : box.exact();
+        std::vector<BodyId> boxes;
+        for (int i = 0; i < 10; ++i) boxes.push_back(s.add({.shape = shape, .pose = {{0, 0.5f + float(i), 0}, {}}}));
+        s.run(10);
+        for (const BodyId id : boxes) {
+            const BodyState state = s.world->state(id);
+            EXPECT_LT(std::hypot(state.pose.position.x, state.pose.position.z), 0.05f) << as_field;
+            EXPECT_TRUE(state.asleep) << as_field;
+        }
+        EXPECT_GT(s.world->state(boxes.back()).pose.position.y, 9.4f) << as_field;
     }
-    EXPECT_GT(s.world->state(boxes.back()).pose.position.y, 9.4f);
 }
 
 TEST_P(AtRest, EightSecondsOverTerrainLoseNobody) {
-    Scene s(GetParam());
-    std::vector<Edit> edits{edit(Plane{})};
-    std::mt19937 rng(3);
-    const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
-    for (int i = 0; i < 30; ++i)
-        edits.push_back(edit(kiln::Sphere{.radius = uniform(0.5f, 1.5f)},
-                             {uniform(-6, 6), uniform(-0.8f, 0), uniform(-6, 6)}, i % 3 == 0 ? Op::Subtract : Op::Union,
-                             0.3f));
-    const auto field = field_of(edits);
-    s.add({.shape = SdfShape::fixed(field), .motion = Motion::Static});
-    std::vector<BodyId> ids;
-    const std::vector<Solid> kinds = solids();
-    for (int i = 0; i < 60; ++i)
-        ids.push_back(s.add(
-            {.shape = kinds[size_t(i) % 4].exact(),
-             .pose = {{uniform(-5, 5), 3 + 0.3f * float(i), uniform(-5, 5)}, axis_angle({0, 0, 1}, uniform(0, 3))}}));
-    s.run(8);
-    EXPECT_LT(s.deepest(), 0.02f);
-    for (size_t i = 0; i < ids.size(); ++i) {
-        const vec3 at = s.world->state(ids[i]).pose.position;
-        EXPECT_GT(field->distance(at), 0) << i;
-        EXPECT_LT(at.y, 20) << i;
-        if (kinds[i % 4].convex.kind != Convex::Kind::Sphere) continue;
-        // None of a ball is in the solid. (How far the middle is from it is not known: distances of blends are bounds.)
-        for (int k = 0; k < 300; ++k) {
-            const vec3 out = normalize(vec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
-            EXPECT_GT(field->distance(at + out * (kinds[i % 4].convex.size.x - 0.02f)), 0) << i;
+    for (const bool as_field : {false, true}) {
+        Scene s(GetParam());
+        std::vector<Edit> edits{edit(Plane{})};
+        std::mt19937 rng(3);
+        const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
+        for (int i = 0; i < 30; ++i)
+            edits.push_back(edit(kiln::Sphere{.radius = uniform(0.5f, 1.5f)},
+                                 {uniform(-6, 6), uniform(-0.8f, 0), uniform(-6, 6)},
+                                 i % 3 == 0 ? Op::Subtract : Op::Union, 0.3f));
+        const auto field = field_of(edits);
+        s.add({.shape = SdfShape::fixed(field), .motion = Motion::Static});
+        std::vector<BodyId> ids;
+        const std::vector<Solid> kinds = solids();
+        std::vector<BodyShape> shapes;
+        for (const Solid& kind : kinds) shapes.push_back(as_field ? kind.field() : kind.exact());
+        for (int i = 0; i < 60; ++i)
+            ids.push_back(s.add({.shape = shapes[size_t(i) % 4],
+                                 .pose = {{uniform(-5, 5), 3 + 0.3f * float(i), uniform(-5, 5)},
+                                          axis_angle({0, 0, 1}, uniform(0, 3))}}));
+        s.run(8);
+        EXPECT_LT(s.deepest(), 0.02f) << as_field;
+        for (size_t i = 0; i < ids.size(); ++i) {
+            const vec3 at = s.world->state(ids[i]).pose.position;
+            EXPECT_GT(field->distance(at), 0) << i << as_field;
+            EXPECT_LT(at.y, 20) << i << as_field;
+            if (kinds[i % 4].convex.kind != Convex::Kind::Sphere) continue;
+            // None of a ball is in the solid. (How far the middle is from it is not known: distances of blends are bounds.)
+            for (int k = 0; k < 300; ++k) {
+                const vec3 out = normalize(vec3{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)});
+                EXPECT_GT(field->distance(at + out * (kinds[i % 4].convex.size.x - 0.02f)), 0) << i << as_field;
+            }
         }
+        EXPECT_EQ(s.world->lost(), 0);
     }
-    EXPECT_EQ(s.world->lost(), 0);
 }
 
 TEST_P(AtRest, FiveFieldToriStack) {

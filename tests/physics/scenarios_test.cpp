@@ -242,16 +242,22 @@ TEST_P(EachEngine, AFieldBodySpinsAboutItsOwnPrincipalAxes) {
 }
 
 TEST_P(EachEngine, AKinematicFloorCarriesWhatStandsOnIt) {
-    Scene s(GetParam());
-    s.add({.shape = Convex::box({3, 0.5f, 3}),
-           .motion = Motion::Kinematic,
-           .pose = {{0, -0.5f, 0}, {}},
-           .friction = 1,
-           .linear_velocity = {0.5f, 0, 0}});
-    const BodyId id = s.add({.shape = Convex::box({0.3f, 0.3f, 0.3f}), .pose = {{0, 0.3f, 0}, {}}, .friction = 1});
-    s.run(2);
-    EXPECT_NEAR(s.world->state(id).linear_velocity.x, 0.5f, 0.02f);
-    EXPECT_NEAR(s.world->state(id).pose.position.y, 0.3f, 0.02f);
+    for (const bool as_field : {false, true}) {
+        Scene s(GetParam());
+        s.add({.shape = Convex::box({3, 0.5f, 3}),
+               .motion = Motion::Kinematic,
+               .pose = {{0, -0.5f, 0}, {}},
+               .friction = 1,
+               .linear_velocity = {0.5f, 0, 0}});
+        const BodyId id =
+            s.add({.shape = as_field ? BodyShape(moving({edit(kiln::Box{.half_extents = {0.3f, 0.3f, 0.3f}})}))
+                                     : Convex::box({0.3f, 0.3f, 0.3f}),
+                   .pose = {{0, 0.3f, 0}, {}},
+                   .friction = 1});
+        s.run(2);
+        EXPECT_NEAR(s.world->state(id).linear_velocity.x, 0.5f, 0.02f) << as_field;
+        EXPECT_NEAR(s.world->state(id).pose.position.y, 0.3f, 0.02f) << as_field;
+    }
 }
 
 }  // namespace

@@ -9,8 +9,10 @@
 #include <nlohmann/json.hpp>
 
 #include "played.h"
+#include "temp_folder.h"
 
 #include <cmath>
+#include <fstream>
 #include <string>
 
 using namespace kiln;
@@ -141,6 +143,60 @@ TEST(BodyEdits, ABodyThatIsDugAwayWholeIsNoMore) {
         ASSERT_TRUE(frame);
         EXPECT_EQ(frame->instances.size(), 2u) << engine;
         EXPECT_GT(p.kept().distance({5, 3, 0}), 0);
+    }
+}
+
+TEST(BodyEdits, WhatIsLeftOfAMeshIsSeenAsTheSolidThatItIs) {
+    const TempFolder folder;
+    {
+        std::ofstream out(folder / "cube.obj");
+        for (const char* v : {"0 0 0", "1 0 0", "1 1 0", "0 1 0", "0 0 1", "1 0 1", "1 1 1", "0 1 1"})
+            out << "v " << v << "\n";
+        for (const char* f : {"4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"})
+            out << "f " << f << "\n";
+    }
+    auto world = World::parse(R"({"format": 1, "field": {"voxel_size": 0.05}, "physics": {"gravity": [0, 0, 0]},
+      "edits": [{"id": "ground", "shape": "plane"}],
+      "meshes": [{"id": "m", "file": "cube.obj", "position": [0, 2, 0]},
+                 {"id": "other", "file": "cube.obj", "position": [5, 2, 0]}],
+      "bodies": [{"id": "crate", "mesh": "m", "linear_velocity": [0, 1, 0]}, {"id": "still", "mesh": "other"}]})",
+                              (folder / "s.kiln.json").string());
+    ASSERT_TRUE(world) << world.error().message;
+    for (const std::string& engine : engines()) {
+        auto play = Play::start(*world, {.backend = engine});
+        ASSERT_TRUE(play) << play.error().message;
+        ASSERT_TRUE(play->step());
+        ASSERT_EQ(play->frame(kCamera)->meshes.size(), 2u);
+        // The half on the side of +X goes; then all.
+        const auto dig = [&](const char* half, const char* at) {
+            const auto done =
+                play->apply(std::string(R"({"add": {"shape": "box", "op": "subtract", "half_extents": )") + half +
+                                R"(, "position": )" + at + R"(}, "target": "crate"})",
+                            "a dig");
+            ASSERT_TRUE(done) << done.error().message;
+        };
+        dig("[0.5, 2, 2]", "[1, 2.5, 0.5]");
+        ASSERT_TRUE(play->step());
+        auto frame = play->frame(kCamera);
+        ASSERT_TRUE(frame) << frame.error().message;
+        EXPECT_EQ(frame->meshes.size(), 1u) << engine << ": the mesh is hidden";
+        const auto ray = [](Play& by, float x) { return by.cast({{x, 2.6f, 9}, {0, 0, -1}})->hit; };
+        EXPECT_TRUE(ray(*play, 0.25f)) << engine;
+        EXPECT_FALSE(ray(*play, 0.75f)) << engine << ": it was cut away";
+        // Whoever keeps it has the same, and plays on from there.
+        World kept = *World::parse(world->to_json(), (folder / "s.kiln.json").string());
+        const auto done = play->keep(kept);
+        ASSERT_TRUE(done) << done.error().message;
+        auto again = Play::start(kept, {.backend = engine});
+        ASSERT_TRUE(again) << again.error().message;
+        ASSERT_TRUE(again->step());
+        EXPECT_EQ(again->frame(kCamera)->meshes.size(), 1u) << engine;
+        EXPECT_TRUE(ray(*again, 0.25f)) << engine;
+        EXPECT_FALSE(ray(*again, 0.75f)) << engine;
+        dig("[2, 2, 2]", "[0.5, 2.5, 0.5]");
+        ASSERT_TRUE(play->step());
+        EXPECT_EQ(play->frame(kCamera)->meshes.size(), 1u) << engine;
+        EXPECT_FALSE(ray(*play, 0.25f)) << engine;
     }
 }
 

@@ -483,7 +483,7 @@ TEST(SlowSimulate, BouldersComeToRestInTheQuarryWithoutFallingThroughOrTrembling
         for (const bool meshed : {false, true}) {
             const Rest rest = rest_of(world, engine, meshed);
             // They fall from the air, and some roll over an edge and fall again.
-            EXPECT_LE(rest.latest, 6u * 60) << rest.what;
+            EXPECT_LE(rest.latest, 5u * 60) << rest.what;
             EXPECT_LE(rest.fastest, 0.02) << rest.what;
         }
 }

@@ -132,14 +132,6 @@ private:
     std::vector<FieldContact>& out_;
 };
 
-// Of many triangles only those that touch as much as the nearest does say where a body rests.
-void drop_far(std::vector<FieldContact>& contacts) {
-    constexpr float kNear = 5e-3f;  // metres
-    float deepest = -1e30f;
-    for (const FieldContact& c : contacts) deepest = std::max(deepest, c.depth);
-    std::erase_if(contacts, [&](const FieldContact& c) { return c.depth < std::min(deepest, 0.0f) - kNear; });
-}
-
 // kFieldFirst: body 0 is the field.
 template <bool kFieldFirst>
 class ConvexAlgorithm final : public SdfAlgorithm {
@@ -172,12 +164,7 @@ public:
             OnRegions gathered(a, b, *shape.sdf().regions(), world_from_field, kFieldFirst, contacts_);
             on_triangles_->processCollision(kFieldFirst ? &regions : convex, kFieldFirst ? convex : &regions, settings,
                                             &gathered);
-            drop_far(contacts_);
-            // Where it rests is said by triangles, how deep and which way by the field: facets would have a ball roll by steps.
-            keep_four(contacts_);
-            measure(shape.sdf(), margin(), contacts_);
-            if (body.kind == Convex::Kind::Sphere)
-                settle_ball(shape.sdf(), field_from_convex.position, body.size.x, margin(), contacts_);
+            settle_on_triangles(shape.sdf(), body, field_from_convex, margin(), contacts_);
         } else {
             on_triangles_.reset();
         }

@@ -196,7 +196,8 @@ protected:
                                       fixed ? kStands : kMoves);
         settings.mUserData = index;
         settings.mEnhancedInternalEdgeRemoval = object->triangles != nullptr;
-        settings.mUseManifoldReduction = fixed || object->shape->GetSubType() != EShapeSubType::User1;  // see Places
+        settings.mUseManifoldReduction = !(b.settings.mesh_voxel > 0) &&
+                                         (fixed || object->shape->GetSubType() != EShapeSubType::User1);  // see Places
         settings.mFriction = b.settings.friction;
         settings.mRestitution = b.settings.restitution;
         settings.mLinearDamping = settings.mAngularDamping = 0;

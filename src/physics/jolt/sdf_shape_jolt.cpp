@@ -29,13 +29,12 @@ namespace {
 using namespace JPH;
 
 constexpr EShapeSubType kType = EShapeSubType::User1;
-constexpr float kAlike = 0.9962f;   // cosine of 5 degrees, as Jolt has it for normals of one manifold
 constexpr float kWorldSize = 1e5f;  // of what has no end: the tree of boxes wants finite ones
 // Jolt keeps contacts between steps, and sorts them, by the numbers of the parts that touch. A field's parts are the directions it faces.
 // Contacts of one pair that face alike within five degrees are one to Jolt (PhysicsSettings::mContactNormalCosMaxDeltaRotation), others
 // must not share a number: their order, and so the outcome, would be left to the threads. Of what it makes one it keeps four points, those
-// far apart from their opposites rather than those that touch: so fields that move are not for it to reduce, and the numbers of their
-// contacts say also where they are.
+// far apart from their opposites rather than those that touch, and gives them one normal: so fields that move, and ground that is meshed
+// where it settled, are not for it to reduce, and the numbers of their contacts say also where they are.
 const JoltSdfShape& field_of(const JPH::Shape* s) { return *static_cast<const JoltSdfShape*>(s); }
 
 Pose pose_of(Mat44Arg m) { return {to_vec(m.GetTranslation()), to_quat(m.GetQuaternion())}; }
@@ -82,49 +81,24 @@ void add(const std::vector<FieldContact>& contacts, const Pose& world, bool fiel
     }
 }
 
-// Hits on meshes of regions, of which those on aprons are let go. Those that point elsewhere than
-// the field does are of edges of facets, by which a box that glides into a hollow would be stopped: they are told as the field has them.
+// Hits on meshes of regions, of which those on aprons are let go: where they touch, in the ground's frame. Facets that a body glides over
+// face now this way, now that, and each turn costs it speed: which way, and how deep, the field says (measure()).
 class OwnHits final : public CollideShapeCollector {
 public:
-    OwnHits(CollideShapeCollector& to, const SdfShape& ground, const Pose& world_from_ground, float margin,
-            uint bits_before)
-        : CollideShapeCollector(to),
-          to_(to),
-          ground_(ground),
-          world_(world_from_ground),
-          local_(inverse(world_from_ground)),
-          margin_(margin),
-          bits_(bits_before + 1) {}
+    OwnHits(const Regions& regions, const Pose& ground_from_world, std::vector<FieldContact>& out)
+        : regions_(regions), local_(ground_from_world), out_(out) {}
     void AddHit(const CollideShapeResult& hit) override {
-        SubShapeID id = hit.mSubShapeID2, rest;
-        (void)id.PopID(bits_, rest);
-        const Regions::Entry* e = ground_.regions()->numbered(rest.PopID(kRegionBits, id));
-        if (e == nullptr || !is_own(*e->mesh, local_ * to_vec(hit.mContactPointOn2))) return;
-        static thread_local std::vector<FieldContact> one;
-        one.assign(1, {local_ * to_vec(hit.mContactPointOn1), {0, 1, 0}, hit.mPenetrationDepth});
-        measure(ground_, margin_, one);
-        if (one.empty()) return;
-        const Vec3 out = to_jolt(rotate(world_.rotation, one.front().normal));
-        to_.SetContext(GetContext());
-        if (-hit.mPenetrationAxis.NormalizedOr(out).Dot(out) > kAlike) {
-            to_.AddHit(hit);
-            UpdateEarlyOutFraction(to_.GetEarlyOutFraction());
-            return;
-        }
-        CollideShapeResult as_field = hit;
-        as_field.mPenetrationAxis = -out;
-        as_field.mPenetrationDepth = one.front().depth;
-        as_field.mContactPointOn2 = hit.mContactPointOn1 + out * one.front().depth;
-        to_.AddHit(as_field);
-        UpdateEarlyOutFraction(to_.GetEarlyOutFraction());
+        SubShapeID rest;
+        const Regions::Entry* e = regions_.numbered(hit.mSubShapeID2.PopID(kRegionBits, rest));
+        const vec3 normal = rotate(local_.rotation, to_vec(-hit.mPenetrationAxis.NormalizedOr(-Vec3::sAxisY())));
+        if (is_own(*e->mesh, local_ * to_vec(hit.mContactPointOn2)))
+            out_.push_back({local_ * to_vec(hit.mContactPointOn1), normal, hit.mPenetrationDepth});
     }
 
 private:
-    CollideShapeCollector& to_;
-    const SdfShape& ground_;
-    Pose world_, local_;
-    float margin_;
-    uint bits_;
+    const Regions& regions_;
+    Pose local_;
+    std::vector<FieldContact>& out_;
 };
 
 void collide_meshed(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg scale1, Vec3Arg scale2,
@@ -133,25 +107,28 @@ void collide_meshed(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg 
                     CollideShapeCollector& collector, const ShapeFilter& filter) {
     static thread_local std::vector<FieldContact> contacts;
     const JoltSdfShape& ground = field_of(shape2);
-    const Pose world = world_of(ground, transform2), local = inverse(world) * pose_of(transform1);
+    const Pose world = world_of(ground, transform2), local_from_world = inverse(world);
+    const Pose local = local_from_world * pose_of(transform1);
     const Convex& body = convex_of(shape1);
     const bool triangles = collide_ground(ground.sdf(), body, local, settings.mMaxSeparationDistance, contacts);
-    add(contacts, world, false, false, {}, id1, id2.PushID(0, 1), collector);
-    if (!triangles) return;
-    // All of them together, so that an edge between two regions is seen to be an inner one.
-    OwnHits own(collector, ground.sdf(), world, settings.mMaxSeparationDistance, id2.GetNumBitsWritten());
-    InternalEdgeRemovingCollector inner(own, settings.mInternalEdgeRemovalVertexToleranceSq);
-    CollideShapeSettings all = settings;
-    all.mActiveEdgeMode = EActiveEdgeMode::CollideWithAll;
-    all.mCollectFacesMode = ECollectFacesMode::CollectFaces;
-    ground.sdf().regions()->each(
-        box_of(body, local).inflated(settings.mMaxSeparationDistance), [&](const Regions::Entry& e) {
-            if (e.mesh->made == nullptr) return;
-            CollisionDispatch::sCollideShapeVsShape(shape1, static_cast<const JPH::Shape*>(e.mesh->made.get()), scale1,
-                                                    scale2, transform1, transform2, id1,
-                                                    id2.PushID(1, 1).PushID(e.number, kRegionBits), all, inner, filter);
-        });
-    inner.Flush();
+    if (triangles) {
+        // All of them together, so that an edge between two regions is seen to be an inner one.
+        OwnHits own(*ground.sdf().regions(), local_from_world, contacts);
+        InternalEdgeRemovingCollector inner(own, settings.mInternalEdgeRemovalVertexToleranceSq);
+        CollideShapeSettings all = settings;
+        all.mActiveEdgeMode = EActiveEdgeMode::CollideWithAll;
+        all.mCollectFacesMode = ECollectFacesMode::CollectFaces;
+        ground.sdf().regions()->each(
+            box_of(body, local).inflated(settings.mMaxSeparationDistance), [&](const Regions::Entry& e) {
+                if (e.mesh->made == nullptr) return;
+                CollisionDispatch::sCollideShapeVsShape(
+                    shape1, static_cast<const JPH::Shape*>(e.mesh->made.get()), scale1, scale2, transform1, transform2,
+                    SubShapeIDCreator(), SubShapeIDCreator().PushID(e.number, kRegionBits), all, inner, filter);
+            });
+        inner.Flush();
+        settle_on_triangles(ground.sdf(), body, local, settings.mMaxSeparationDistance, contacts);
+    }
+    add(contacts, world, false, true, to_vec(transform1.GetTranslation()), id1, id2, collector);
 }
 
 void collide_convex(const JPH::Shape* shape1, const JPH::Shape* shape2, Vec3Arg scale1, Vec3Arg scale2,
@@ -269,9 +246,7 @@ AABox JoltSdfShape::GetLocalBounds() const {
     return {to_jolt(box.min - center()), to_jolt(box.max - center())};
 }
 
-uint JoltSdfShape::GetSubShapeIDBitsRecursive() const {
-    return sdf_->regions() != nullptr ? 1 + kRegionBits + kMeshBits : 2 * kFacingBits;
-}
+uint JoltSdfShape::GetSubShapeIDBitsRecursive() const { return 2 * kFacingBits; }
 
 const PhysicsMaterial* JoltSdfShape::GetMaterial(const SubShapeID&) const { return PhysicsMaterial::sDefault; }
 

@@ -70,9 +70,8 @@ private:
     std::shared_ptr<const SdfShape> sdf_;
 };
 
-// Parts of a field are numbered by the direction they face; of meshed ground, one bit tells triangles from the field, then come the number
-// of the region and its mesh's own.
-inline constexpr JPH::uint kRegionBits = 9, kMeshBits = 32 - 1 - kRegionBits;
+// While contacts with meshed ground are gathered, its parts are numbered by the region, then by its mesh's own numbers.
+inline constexpr JPH::uint kRegionBits = 9, kMeshBits = 32 - kRegionBits;
 static_assert(kMostRegions <= 1u << kRegionBits);
 
 /// What a mesh is made of, likewise.
