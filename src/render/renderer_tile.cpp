@@ -28,7 +28,8 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
         if (n.instance != kNoInstance)
             seen.push_back({vec3{n.low_x, n.low_y, n.low_z} * h, vec3{n.high_x, n.high_y, n.high_z} * h});
     const PixelRect tile{params.tile_x, params.tile_y, params.tile_width, params.tile_height};
-    for (const PixelRect& rect : through_rects(seen, params.camera, tile, kBentRays)) {
+    const int apart = refines_on_host() ? kPixelsApart : kPixelsApartOfGpu;
+    for (const PixelRect& rect : through_rects(seen, params.camera, tile, kBentRays, apart)) {
         FrameParams part = params;
         part.tile_x = rect.x, part.tile_y = rect.y;
         part.tile_width = rect.width, part.tile_height = rect.height;

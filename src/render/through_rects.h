@@ -16,9 +16,10 @@ struct PixelRect {
     friend bool operator==(const PixelRect&, const PixelRect&) = default;
 };
 
-// Covers what the camera sees of boxes (metres from the eye) in that part of the picture, in bands of at most `most` pixels; nothing where it
-// sees none.
+// Covers what the camera sees of boxes (metres from the eye) in that part of the picture: rectangles that share no pixel, in bands of at most
+// `most` pixels, the upper first; none where it sees none. Each costs passes of its own, so two are one where that adds fewer than `apart`
+// (above 0) pixels, and there are never more than a few. The order of the boxes changes nothing.
 std::vector<PixelRect> through_rects(std::span<const Box3> boxes, const shade::CameraParams& camera,
-                                     const PixelRect& tile, int most);
+                                     const PixelRect& tile, int most, int apart);
 
 }  // namespace kiln::render

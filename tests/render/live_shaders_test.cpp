@@ -41,8 +41,8 @@ struct LiveShadersGpu : GpuTest {
         std::ofstream(root() / "changed") << text;
         std::filesystem::rename(root() / "changed", root() / file);  // never half of it
     }
-    // A grey picture through the tone map.
-    std::vector<uint8_t> shown() {
+    // A grey picture through the tone map, on its way.
+    Readback draw() {
         Graph g(*runner_);
         Image radiance = g.create("radiance", {.size = {16, 8}, .format = rhi::Format::Rgba16Float});
         g.clear(radiance, {0.5f, 0.25f, 0.125f, 1});
@@ -50,8 +50,9 @@ struct LiveShadersGpu : GpuTest {
         const Buffer exposure = g.upload("exposure", std::span<const float>(one));
         const Readback back = g.readback(tonemap(g, radiance, radiance, exposure, {.tone_map = ToneMap::None}));
         rhi::must(runner_->execute(g));
-        return rhi::must(back.get_as<uint8_t>());
+        return back;
     }
+    std::vector<uint8_t> shown() { return rhi::must(draw().get_as<uint8_t>()); }
     std::vector<std::string> looked() {
         live->finish();
         return live->apply(runner_->pipelines());
@@ -86,6 +87,27 @@ TEST_F(LiveShadersGpu, AChangedShaderIsSeenInTheNextPictureAndABrokenOneIsNot) {
     change("render/passes/tonemap.comp", "c.bgr * no_such_thing", "c * exposure.multiplier");
     EXPECT_TRUE(looked().empty());
     EXPECT_EQ(shown(), before);
+}
+
+// Frames are in flight when the pipeline is made anew. What validation says of any of them fails the test as it ends.
+TEST_F(LiveShadersGpu, AReloadAmongSixtyFramesChangesThoseBehindItAndLeavesNothing) {
+    std::vector<Readback> frames;
+    size_t settled = 0;
+    for (int frame = 0; frame < 60; ++frame) {
+        if (frame == 29) settled = device_->live_handle_count();
+        if (frame == 30) {
+            change("render/passes/tonemap.comp", "c * exposure.multiplier", "c.bgr * exposure.multiplier");
+            live->finish();
+        }
+        EXPECT_TRUE(live->apply(runner_->pipelines()).empty()) << frame;
+        frames.push_back(draw());
+        if (frame < 2) continue;
+        const auto seen = rhi::must(frames[0].get_as<uint8_t>());
+        EXPECT_EQ(seen[0] < seen[2], frame - 2 >= 30) << "frame " << frame - 2;
+        frames.erase(frames.begin());
+    }
+    EXPECT_EQ(live->swapped(), 1u);
+    EXPECT_EQ(device_->live_handle_count(), settled) << device_->live_handles();
 }
 
 TEST_F(LiveShadersGpu, WhatAShaderIncludesCountsAsItsOwn) {

@@ -8,6 +8,7 @@
 #include "render/reference_glass.h"
 #include "render/through_rects.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -329,13 +330,21 @@ TEST(Glass, OnTheScreenIsWithinItsParts) {
             const vec3 at{in(-3, 3), in(-3, 3), in(-3, 3)}, half{in(0.01f, 1), in(0.01f, 1), in(0.01f, 1)};
             boxes.push_back({at - half, at + half});
         }
-        const std::vector<PixelRect> parts = through_rects(boxes, eye, tile, 5000);
-        int rows = parts.empty() ? 0 : parts[0].y;
-        for (const PixelRect& r : parts) {
+        const std::vector<PixelRect> parts = through_rects(boxes, eye, tile, 5000, 1 + 500 * (round % 5));
+        for (size_t i = 0; i < parts.size(); ++i) {
+            const PixelRect& r = parts[i];
             EXPECT_LE(r.width * r.height, 5000);
-            EXPECT_EQ(r.y, rows) << "bands lie one below the other";
-            rows += r.height;
+            EXPECT_TRUE(r.width > 0 && r.height > 0 && r.x >= 40 && r.y >= 30 && r.x + r.width <= 240 &&
+                        r.y + r.height <= 180);
+            for (size_t k = 0; k < i; ++k) {
+                const PixelRect& other = parts[k];
+                EXPECT_TRUE(r.x >= other.x + other.width || other.x >= r.x + r.width || r.y >= other.y + other.height ||
+                            other.y >= r.y + r.height)
+                    << "each pixel is drawn once";
+            }
         }
+        std::shuffle(boxes.begin(), boxes.end(), random);
+        EXPECT_EQ(through_rects(boxes, eye, tile, 5000, 1 + 500 * (round % 5)), parts) << "in any order";
         for (int k = 0; k < 200; ++k) {
             const Box3& box = boxes[size_t(k) % boxes.size()];
             const vec3 p{in(box.min.x, box.max.x), in(box.min.y, box.max.y), in(box.min.z, box.max.z)};
@@ -351,6 +360,32 @@ TEST(Glass, OnTheScreenIsWithinItsParts) {
         }
     }
     EXPECT_GT(seen, 500);
+}
+
+TEST(Glass, ThatStandsApartHasPartsOfItsOwn) {
+    const shade::CameraParams eye = shade::camera_params(Camera{.position = {0, 0, 0}, .target = {0, 0, -1}}, 320, 240);
+    const PixelRect tile{0, 0, 320, 240};
+    const auto ball = [](float x, float y) { return Box3{{x - 0.1f, y - 0.1f, -5.1f}, {x + 0.1f, y + 0.1f, -4.9f}}; };
+    const std::vector<Box3> two{ball(-2, 1), ball(2, -1)};
+    const auto pixels = [](const std::vector<PixelRect>& parts) {
+        int sum = 0;
+        for (const PixelRect& r : parts) sum += r.width * r.height;
+        return sum;
+    };
+    const auto apart = through_rects(two, eye, tile, 1 << 20, 1000),
+               one = through_rects(two, eye, tile, 1 << 20, 1 << 20);
+    EXPECT_EQ(apart.size(), 2u);
+    EXPECT_EQ(one.size(), 1u);
+    EXPECT_LT(10 * pixels(apart), pixels(one));
+    std::vector<Box3> many;
+    for (int i = 0; i < 400; ++i) many.push_back(ball(float(i % 20) * 0.25f - 2.4f, float(i / 20) * 0.25f - 2.4f));
+    EXPECT_LE(through_rects(many, eye, tile, 1 << 20, 1).size(), 6u) << "each costs passes of its own";
+    const std::vector<Box3> corners{ball(-2.4f, -2), ball(-2.4f, 2), ball(2.4f, -2), ball(2.4f, 2)};
+    std::vector<Box3> near;
+    for (const Box3& box : corners)
+        for (int i = 0; i < 5; ++i)
+            near.push_back(Box3{box.min + vec3(0.04f * float(i)), box.max + vec3(0.04f * float(i))});
+    EXPECT_EQ(through_rects(near, eye, tile, 1 << 20, 1000).size(), 4u) << "what overlaps is one";
 }
 
 // The judge itself: what comes straight through a slab.

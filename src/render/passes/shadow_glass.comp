@@ -67,59 +67,84 @@ vec3 left_by_object(GlassRecord g, TexelRay ray, float t_last, float metres_a_vo
     return left;
 }
 
-// From a point of a surface, counted from the eye in finest voxels.
-vec3 through_glass(vec3 p, vec3 n, vec3 l, float t_last) {
-    vec3 left = vec3(1.0);
-    vec3 inverse = walk_inverse(l);
-    uint at = 0u;
-    while (at < push.node_count) {
-        // To the next leaf first, as in march_sets.glsl.
-        uint found = kNoInstance;
-        while (at < push.node_count && found == kNoInstance) {
-            InstanceNode node = nodes[at];
-            bool meets = walk_meets(node, p, inverse, t_last);
-            at = meets ? at + 1u : node.skip;
+// The lights of a pixel's list one after the other, and for each the glass that its way may meet. A search goes over nodes and lights alike, so that
+// rays that are in step go through glass together whichever lights they are for, and most pixels, near no glass, never do.
+struct GlassSearch {
+    LightWalk walk;
+    uint channel;  // of the light at hand, in the batch
+    uint at;       // node
+    bool more;     // a light is at hand
+    LightSample light;
+    vec3 inverse;
+    vec3 left;     // of that light
+};
+
+GlassSearch search;
+uvec4 fractions;
+uvec4 low = uvec4(0xffffffffu);
+uvec4 high = uvec4(0xffffffffu);
+
+void light_is_done() {
+    float most = max(search.left.r, max(search.left.g, search.left.b));
+    if (most >= 1.0) return;
+    set_visible_fraction(fractions, search.channel, visible_fraction(fractions, search.channel) * most);
+    if (search.channel < 8u) {
+        pack_tint(low, search.channel, search.left / max(most, 1e-20));
+    } else {
+        pack_tint(high, search.channel & 7u, search.left / max(most, 1e-20));
+    }
+}
+
+// The next glass on a way from p, counted from the eye in finest voxels; kNoInstance: no light has any more.
+uint next_glass(vec3 p, vec3 p_world) {
+    uint found = kNoInstance;
+    do {
+        if (search.at >= push.node_count) {
+            light_is_done();
+            ++search.channel;
+            uint index = search.channel < kLightsAtOnce ? next_light(search.walk) : kNoLight;
+            search.more = index != kNoLight;
+            search.left = vec3(1.0);
+            if (search.more && visible_fraction(fractions, search.channel) > 0.0) {
+                search.light = sample_light(lights[index], p_world);
+                search.inverse = walk_inverse(search.light.l);
+                search.at = 0u;
+            }
+        }
+        while (search.at < push.node_count && found == kNoInstance) {
+            InstanceNode node = nodes[search.at];
+            bool meets = walk_meets(node, p, search.inverse, search.light.distance / frame.grid.voxel_size);
+            search.at = meets ? search.at + 1u : node.skip;
             if (meets) found = node.instance;
         }
-        if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
-        // Off the surface by as much as its own bricks may be wrong.
-        TexelRay ray = object_ray(instance, p + n * (1.0 / instance.voxels), l);
-        left *= left_by_object(glass_of(found), ray, min(t_last * instance.voxels, kFarVoxels), frame.grid.voxel_size / instance.voxels);
-    }
-    return left;
+    } while (search.more && found == kNoInstance);
+    return found;
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
     uvec4 seen = texelFetch(visibility, pixel, 0);
-    uvec4 fractions = texelFetch(fractions_before, pixel, 0);
-    uvec4 low = uvec4(0xffffffffu);
-    uvec4 high = uvec4(0xffffffffu);
+    fractions = texelFetch(fractions_before, pixel, 0);
     uint state = seen.y >> 28u;
     if (state != kSeenNothing && state != kSeenInside && fractions != uvec4(0u)) {
         TexelRay ray = pixel_ray(pixel);
         vec3 n = unpack_surface(texelFetch(surface_words, pixel, 0)).normal;
         vec3 p = from_eye(ray) + ray.direction * uintBitsToFloat(seen.x);
         vec3 p_world = seen_point(ray, seen);
-        LightWalk walk = light_walk(pixel, push.first_light);
-        for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
-            uint index = next_light(walk);
-            if (index == kNoLight) break;
-            float before = visible_fraction(fractions, channel);
-            if (before <= 0.0) continue;
-            LightSample light = sample_light(lights[index], p_world);
-            vec3 left = through_glass(p, n, light.l, light.distance / frame.grid.voxel_size);
-            float most = max(left.r, max(left.g, left.b));
-            if (most >= 1.0) continue;
-            set_visible_fraction(fractions, channel, before * most);
-            if (channel < 8u) {
-                pack_tint(low, channel, left / max(most, 1e-20));
-            } else {
-                pack_tint(high, channel & 7u, left / max(most, 1e-20));
-            }
+        search.walk = light_walk(pixel, push.first_light);
+        search.channel = 0xffffffffu;  // before the first
+        search.at = push.node_count;
+        search.left = vec3(1.0);
+        uint found = next_glass(p, p_world);
+        while (found != kNoInstance) {
+            InstanceRecord instance = instances[found];
+            here = sets[instance.set];
+            // Off the surface by as much as its own bricks may be wrong.
+            TexelRay way = object_ray(instance, p + n * (1.0 / instance.voxels), search.light.l);
+            float t_last = search.light.distance / frame.grid.voxel_size;
+            search.left *= left_by_object(glass_of(found), way, min(t_last * instance.voxels, kFarVoxels), frame.grid.voxel_size / instance.voxels);
+            found = next_glass(p, p_world);
         }
     }
     imageStore(visible_fractions, pixel, fractions);
