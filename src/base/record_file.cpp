@@ -12,11 +12,8 @@
 #include <array>
 #include <bit>
 #include <cerrno>
-#include <chrono>
-#include <condition_variable>
 #include <cstring>
 #include <limits>
-#include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
@@ -29,8 +26,6 @@ static_assert(std::endian::native == std::endian::little, "files are little-endi
 constexpr std::string_view kMagic = "KILNREC1";
 constexpr size_t kHeaderBytes = 32;
 constexpr uint32_t kMostPayload = 1u << 30;
-/// From the first record that is not on the disk to the flush that brings it there; with the flush itself, below a tenth of a second.
-constexpr std::chrono::milliseconds kGroupCommit{50};
 
 template <typename T>
 T take(std::string_view bytes, size_t at) {
@@ -99,7 +94,18 @@ Records read_records(std::string_view bytes) {
     return out;
 }
 
+CommitClock::Time CommitClock::now() { return std::chrono::steady_clock::now(); }
+void CommitClock::wait(std::condition_variable& wake, std::unique_lock<std::mutex>& lock, Time until) {
+    if (until == Time::max())
+        wake.wait(lock);
+    else
+        wake.wait_until(lock, until);
+}
+int CommitClock::sync(int fd) { return fdatasync(fd) == 0 ? 0 : errno; }
+
 struct RecordFile::Impl {
+    CommitClock system_clock;
+    CommitClock* clock = &system_clock;
     std::string path;
     int fd = -1;
     bool held = false;            // the lock is ours
@@ -110,11 +116,12 @@ struct RecordFile::Impl {
     std::optional<Hash128> owed;  // the header that restart() could not write
     std::string buffer;
 
-    // The thread that flushes.
+    // The thread that syncs.
     std::mutex mutex;
     std::condition_variable wake;
     bool dirty = false, stopping = false;
-    int failed = 0;  // errno of a flush that did not work
+    CommitClock::Time due;  // while dirty
+    int failed = 0;         // errno of a flush that did not work
     std::thread flusher;
 
     ~Impl() {
@@ -132,28 +139,29 @@ struct RecordFile::Impl {
 
     void run() {
         std::unique_lock lock(mutex);
-        while (true) {
-            wake.wait(lock, [&] { return dirty || stopping; });
-            if (dirty && !stopping) wake.wait_for(lock, kGroupCommit, [&] { return stopping; });
-            if (!dirty && stopping) return;
-            if (!dirty) continue;  // flush() was first
+        while (dirty || !stopping) {
+            if (!stopping && (!dirty || clock->now() < due)) {
+                clock->wait(wake, lock, dirty ? due : CommitClock::Time::max());
+                continue;
+            }
             dirty = false;
             lock.unlock();
-            const int error = fdatasync(fd) == 0 ? 0 : errno;
+            const int error = clock->sync(fd);
             lock.lock();
             if (error) failed = error;
         }
     }
 
+    // What comes during a sync counts from itself: else it would wait for that sync, kGroupCommit, and its own.
     void changed() {
-        bool first = false;
         {
             const std::lock_guard lock(mutex);
-            first = !dirty;
+            if (dirty) return;
             dirty = true;
+            due = clock->now() + kGroupCommit;
             if (!flusher.joinable()) flusher = std::thread([this] { run(); });
         }
-        if (first) wake.notify_one();
+        wake.notify_one();
     }
 
     // Everything or nothing; 0 or errno.
@@ -190,8 +198,9 @@ const std::string& RecordFile::path() const { return impl_->path; }
 uint32_t RecordFile::next_sequence() const { return impl_->sequence; }
 uint64_t RecordFile::bytes() const { return impl_->end; }
 
-Result<RecordFile> RecordFile::open(const std::string& path, std::string& bytes) {
+Result<RecordFile> RecordFile::open(const std::string& path, std::string& bytes, CommitClock* clock) {
     auto impl = std::make_unique<Impl>();
+    if (clock) impl->clock = clock;
     impl->path = path;
     for (int attempt = 0;; ++attempt) {
         impl->fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
@@ -293,7 +302,7 @@ Result<void> RecordFile::flush() {
         const std::lock_guard lock(m.mutex);
         m.dirty = false;
     }
-    const int error = fdatasync(m.fd) == 0 ? 0 : errno;
+    const int error = m.clock->sync(m.fd);
     const std::lock_guard lock(m.mutex);
     if (error) m.failed = error;
     return m.failed ? Result<void>(failure(m.path, m.failed)) : Result<void>();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // RecordFile: an append-only file of records for journals. A record that append() has taken survives the end of this process at once, and a
-// power cut a tenth of a second later at most. What a broken file still holds for certain can always be told:
+// power cut a tenth of a second later at most, where the disk syncs in half of that. What a broken file still holds for certain can always be told:
 //   header   "KILNREC1"  base.low  base.high  checksum                   eight bytes each, little-endian
 //   record   length (4)  sequence (4)  checksum (8)  payload             sequences count from 1
 // A checksum covers its record and the checksum before it, so a record is right only at its own place in its own file.
@@ -10,8 +10,11 @@
 
 #include <kiln/result.h>
 
+#include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,11 +36,27 @@ struct Records {
 /// Reads any bytes. The payloads look into them.
 Records read_records(std::string_view bytes);
 
+/// From the first record that is not on the disk to the sync that brings it and all before it there.
+inline constexpr std::chrono::milliseconds kGroupCommit{50};
+
+/// Time and disk, as the thread that syncs a RecordFile sees them. A test brings its own.
+class CommitClock {
+public:
+    using Time = std::chrono::steady_clock::time_point;
+    virtual ~CommitClock() = default;
+    virtual Time now();
+    /// Until woken or `until`, or for no reason; the lock is held again when it returns.
+    virtual void wait(std::condition_variable& wake, std::unique_lock<std::mutex>& lock, Time until);
+    /// What was written is on the disk when this returns; 0 or errno. From any thread.
+    virtual int sync(int fd);
+};
+
 /// A file without records is removed when it is closed.
 class RecordFile {
 public:
     /// Opens or creates the file for one writer: fails while another holds it, in this process or another. `bytes` is what was in it.
-    static Result<RecordFile> open(const std::string& path, std::string& bytes);
+    /// A clock outlives the file; none: the system's.
+    static Result<RecordFile> open(const std::string& path, std::string& bytes, CommitClock* clock = nullptr);
     /// Whether some writer holds the file now.
     static bool is_held(const std::string& path);
     RecordFile(RecordFile&&) noexcept;

@@ -54,8 +54,8 @@ double ms_of(const FrameWork& work, std::string_view kind) {
 
 // Rows have no peer of their own: it is the still world.
 void measure_movers(BenchRun& run, FrameWork& still, FrameWork& moving, std::string_view view, int width, int height) {
-    constexpr std::string_view kKinds[] = {"march", "shadow", "all"};
-    std::array<double, 3> least, least_still;
+    constexpr std::string_view kKinds[] = {"march", "resolve", "ao", "shadow", "all"};
+    std::array<double, std::size(kKinds)> least, least_still;
     least.fill(1e300);
     least_still.fill(1e300);
     uint64_t checksum = 0, other = 0;

@@ -264,17 +264,29 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
     place_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
+// Things as large as a node, as an image of nodes.
+static Image upload_nodes(Graph& graph, std::string_view name, std::span<const std::byte> bytes) {
+    const size_t row = kNodesARow * sizeof(InstanceNode), rows = (bytes.size() + row - 1) / row;
+    std::vector<std::byte> whole(rows * row);
+    std::memcpy(whole.data(), bytes.data(), bytes.size());
+    const rhi::Extent size{2 * kNodesARow, uint32_t(rows)};
+    Image out = graph.create(std::string(name), {.size = size, .format = rhi::Format::Rgba32Uint});
+    const CopyRegion all[] = {{.size = size}};
+    graph.copy(graph.upload(std::string(name), std::span<const std::byte>(whole)), out, all);
+    return out;
+}
+
 InstanceHandles GpuInstances::import(Graph& graph) const {
     InstanceHandles out;
     if (nodes_.empty() && glass_nodes_.empty()) return out;
     out.instances = graph.upload("instances", std::span<const InstanceRecord>(records_));
-    if (!nodes_.empty()) out.nodes = graph.upload("instance tree", std::span<const InstanceNode>(nodes_));
+    if (!nodes_.empty()) out.nodes = upload_nodes(graph, "instance tree", std::as_bytes(std::span(nodes_)));
     if (!glass_nodes_.empty()) {
         std::vector<std::byte> tree(glass_nodes_.size() * sizeof(InstanceNode) + glass_.size() * sizeof(GlassRecord));
         std::memcpy(tree.data(), glass_nodes_.data(), glass_nodes_.size() * sizeof(InstanceNode));
         std::memcpy(tree.data() + glass_nodes_.size() * sizeof(InstanceNode), glass_.data(),
                     glass_.size() * sizeof(GlassRecord));
-        out.glass_nodes = graph.upload("glass tree", std::span<const std::byte>(tree));
+        out.glass_nodes = upload_nodes(graph, "glass tree", tree);
         out.glass = graph.upload("glass", std::span<const GlassRecord>(glass_));
     }
     out.sets = graph.import("instance sets", set_table_);

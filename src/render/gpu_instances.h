@@ -21,13 +21,14 @@ namespace kiln::render {
 
 // What the passes of a frame read of its instances.
 struct InstanceHandles {
-    Buffer instances, sets, nodes, cells;
+    Buffer instances, sets, cells;
     Buffer records, code, numbers;
+    Buffer glass;  // GlassRecord of every instance
+    // The trees, kNodesARow nodes a row; behind that of things that light goes through, those records again.
+    Image nodes, glass_nodes;
     uint32_t node_count = 0;
-    TapeUse use;  // of the sets' code
-    Buffer glass_nodes,
-        glass;  // GlassRecord of every instance; the tree of those that light goes through, and those records again
     uint32_t glass_node_count = 0;
+    TapeUse use;  // of the sets' code
     uint32_t by_tree =
         0;  // 1: rays of the march walk the tree, as those do whose list is too long (the slow twin of the lists)
     explicit operator bool() const { return node_count != 0; }

@@ -1,6 +1,7 @@
 #version 460
 // SPDX-License-Identifier: MIT
-// Closes the rays of ambient occlusion that meet an instance: each goes down the tree as a hard shadow does.
+// Closes the rays of ambient occlusion that meet an instance: each goes down the tree as a hard shadow does. A pixel's rays follow one another in one
+// loop, as in ao.glsl.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
@@ -12,7 +13,7 @@ layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Nodes { InstanceNode nodes[]; };
+layout(set = 0, binding = 3) uniform utexture2D instance_nodes;
 layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
@@ -27,25 +28,6 @@ layout(push_constant) uniform Push { AoPush push; };
 #include "render/passes/rays.glsl"
 #include "render/passes/surface.glsl"
 #include "render/passes/ao_rays.glsl"
-
-bool meets_instance(vec3 p, vec3 direction) {
-    vec3 inverse = walk_inverse(direction);
-    uint at = 0u;
-    float enters = 0.0;
-    int looks = 0;
-    InstanceNode leaf = nodes[0];
-    while (true) {
-        uint found = next_in_tree(at, p, direction, inverse, 0.0, kFarVoxels, leaf, enters, looks);
-        if (found == kNoInstance) return false;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
-        TexelRay ray = object_ray(instance, p, direction);
-        float begin = 0.5;
-        float end = kFarVoxels;
-        set_span(ray, 0.0, begin, end);
-        if (begin <= end && field_march(here.grid, ray, begin, end, true).state != kMarchMiss) return true;
-    }
-}
 
 void main() {
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
@@ -64,8 +46,36 @@ void main() {
     if (state == kSeenInstance) voxel = 1.0 / instances[seen.y & 0x0fffffffu].voxels;
     vec3 normal = unpack_unit(point.y);
     vec3 p = from_eye(ray) + ray.direction * t + normal * ao_offset(state, voxel, t);
-    for (uint i = 0u; i < push.rays; ++i) {
-        if ((point.x & (1u << i)) != 0u && meets_instance(p, ao_direction(texel, i, normal))) point.x &= ~(1u << i);
+    uint left = point.x & kAoOpen;
+    int number = findLSB(left);
+    vec3 direction = ao_direction(texel, uint(number), normal);
+    vec3 inverse = walk_inverse(direction);
+    uint at = 0u;
+    float enters = 0.0;
+    int looks = 0;
+    InstanceNode leaf = node_at(0u);
+    while (left != 0u) {
+        uint found = next_in_tree(at, p, direction, inverse, 0.0, kFarVoxels, leaf, enters, looks);
+        bool ends = found == kNoInstance;
+        if (!ends) {
+            InstanceRecord instance = instances[found];
+            here = sets[instance.set];
+            TexelRay local = object_ray(instance, p, direction);
+            float begin = 0.5;
+            float end = kFarVoxels;
+            set_span(local, 0.0, begin, end);
+            if (begin <= end && field_march(here.grid, local, begin, end, true).state != kMarchMiss) {
+                point.x &= ~(1u << number);
+                ends = true;
+            }
+        }
+        if (ends) {
+            left &= left - 1u;
+            number = max(findLSB(left), 0);
+            direction = ao_direction(texel, uint(number), normal);
+            inverse = walk_inverse(direction);
+            at = 0u;
+        }
     }
     imageStore(ao_points, texel, point);
 }

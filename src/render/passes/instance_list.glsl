@@ -94,7 +94,7 @@ void make_list(bool has_ray, vec3 from, vec3 direction, bool from_eye) {
     while (begin < end) {
         for (uint i = begin + thread; i < end; i += kListThreads) {
             uint at = list_opened[i];
-            InstanceNode node = nodes[at];
+            InstanceNode node = node_at(at);
             float near = list_enters(node, beam);
             if (near >= kFarVoxels) continue;
             if (node.instance != kNoInstance) {
@@ -107,7 +107,7 @@ void make_list(bool has_ray, vec3 from, vec3 direction, bool from_eye) {
                 uint n = atomicAdd(list_end, 2u);
                 if (n < kMostOpened) {
                     list_opened[n] = at + 1u;
-                    list_opened[n + 1u] = nodes[at + 1u].skip;
+                    list_opened[n + 1u] = node_at(at + 1u).skip;
                 }
             }
         }
@@ -144,7 +144,7 @@ uint next_leaf(inout uint at, vec3 from, vec3 inverse, float t_end, inout float 
     InstanceNode leaf;
     if (list_count > kMostListed) return next_in_tree(at, from, vec3(0.0), inverse, 0.0, t_end, leaf, enters, looks);
     while (at < list_count && list_near[at] <= t_end) {
-        leaf = nodes[list_nodes[at]];
+        leaf = node_at(list_nodes[at]);
         looks++;
         at++;
         enters = walk_enters(leaf, from, inverse, t_end);

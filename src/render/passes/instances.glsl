@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Bricks of instances in kernels: their field for field/march.gpu.h and field/surface.gpu.h, and the walk of a ray through the tree. The including
 // kernel declares first what atlas.glsl and rays.glsl ask for, and
-//   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: InstanceNode nodes[], InstancePush push;
+//   InstanceRecord instances[], InstanceSet sets[], uint instance_cells[];  for the walk: utexture2D instance_nodes, InstancePush push;
 //   for KILN_FIELD_SURFACE also utexture3D materials.
 
 #include "field/brick_walk.gpu.h"
@@ -57,6 +57,13 @@ uint field_material(int slot, ivec3 texel) { return brick_material(slot + int(he
 #endif
 
 #ifdef KILN_INSTANCE_WALK
+InstanceNode node_at(uint i) {
+    ivec2 at = ivec2(2 * int(i % kNodesARow), int(i / kNodesARow));
+    uvec4 a = texelFetch(instance_nodes, at, 0);
+    uvec4 b = texelFetch(instance_nodes, at + ivec2(1, 0), 0);
+    return InstanceNode(uintBitsToFloat(a.x), uintBitsToFloat(a.y), uintBitsToFloat(a.z), a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), uintBitsToFloat(b.z), b.w);
+}
+
 // 1 / direction for boxes: large where it is parallel.
 vec3 walk_inverse(vec3 direction) {
     vec3 far = mix(vec3(-kFarVoxels), vec3(kFarVoxels), greaterThanEqual(direction, vec3(0.0)));
@@ -110,7 +117,7 @@ float node_enters(InstanceNode node, vec3 from, vec3 direction, vec3 inverse, fl
 uint next_in_tree(inout uint at, vec3 from, vec3 direction, vec3 inverse, float tan_radius, float t_end, inout InstanceNode leaf, inout float enters,
                   inout int looks) {
     while (at < push.node_count) {
-        leaf = nodes[at];
+        leaf = node_at(at);
         looks++;
         enters = node_enters(leaf, from, direction, inverse, tan_radius, t_end);
         at = enters < kFarVoxels ? at + 1u : leaf.skip;

@@ -27,7 +27,7 @@ layout(set = 0, binding = 8, std140) uniform Levels { LevelsParams levels; Level
 #ifdef KILN_INSTANCES
 layout(set = 0, binding = KILN_NEXT_BINDING, std430) readonly buffer Instances { InstanceRecord instances[]; };
 layout(set = 0, binding = KILN_NEXT_BINDING + 1, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = KILN_NEXT_BINDING + 2, std430) readonly buffer Nodes { InstanceNode nodes[]; };
+layout(set = 0, binding = KILN_NEXT_BINDING + 2) uniform utexture2D instance_nodes;
 layout(set = 0, binding = KILN_NEXT_BINDING + 3, std430) readonly buffer InstanceCells { uint instance_cells[]; };
 layout(push_constant) uniform Push { InstancePush push; };
 #endif

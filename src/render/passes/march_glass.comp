@@ -13,7 +13,7 @@ layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Nodes { InstanceNode nodes[]; };  // of glass
+layout(set = 0, binding = 3) uniform utexture2D instance_nodes;  // of glass
 layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
@@ -60,7 +60,7 @@ void main() {
         // To the next leaf first, so that rays that are in step march together.
         uint found = kNoInstance;
         while (at < push.node_count && found == kNoInstance) {
-            InstanceNode node = nodes[at];
+            InstanceNode node = node_at(at);
             bool meets = walk_meets(node, from, inverse, nearest);
             at = meets ? at + 1u : node.skip;
             if (meets) found = node.instance;

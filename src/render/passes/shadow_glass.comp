@@ -17,7 +17,7 @@ layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights
 layout(set = 0, binding = 3, std430) readonly buffer LightMasks { uint light_masks[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Instances { InstanceRecord instances[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 6, std430) readonly buffer Nodes { InstanceNode nodes[]; };  // of glass; then the GlassRecord of every instance
+layout(set = 0, binding = 6) uniform utexture2D instance_nodes;  // of glass; then the GlassRecord of every instance
 layout(set = 0, binding = 7, std430) readonly buffer Cells { uint instance_cells[]; };
 layout(set = 0, binding = 8, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 9) uniform texture3D distances;
@@ -38,9 +38,9 @@ layout(push_constant) uniform Push { InstancePush push; };
 #include "render/passes/surface.glsl"
 #include "render/passes/glass_tint.glsl"
 
-// A kernel has eight buffers; a record is as large as a node.
+// Behind the nodes: a record is as large as one.
 GlassRecord glass_of(uint instance) {
-    InstanceNode n = nodes[push.node_count + instance];
+    InstanceNode n = node_at(push.node_count + instance);
     return GlassRecord(n.low_x, n.low_y, n.low_z, 0.0, n.high_x, n.high_y, 0.0, 0.0);
 }
 
@@ -112,7 +112,7 @@ uint next_glass(vec3 p, vec3 p_world) {
             }
         }
         while (search.at < push.node_count && found == kNoInstance) {
-            InstanceNode node = nodes[search.at];
+            InstanceNode node = node_at(search.at);
             bool meets = walk_meets(node, p, search.inverse, search.light.distance / frame.grid.voxel_size);
             search.at = meets ? search.at + 1u : node.skip;
             if (meets) found = node.instance;

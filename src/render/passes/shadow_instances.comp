@@ -13,7 +13,7 @@ layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3, std430) readonly buffer Nodes { InstanceNode nodes[]; };
+layout(set = 0, binding = 3) uniform utexture2D instance_nodes;
 layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
@@ -77,7 +77,7 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
     uint at = 0u;
     float enters = 0.0;
     int looks = 0;
-    InstanceNode leaf = nodes[0];
+    InstanceNode leaf = node_at(0u);
     while (true) {
         // To the next leaf first, as in march_sets.glsl.
         uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
