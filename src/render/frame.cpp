@@ -158,20 +158,25 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
     return out;
 }
 
-TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image words, const Image& refined,
+// `refined`: none where march's words are good enough.
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image* refined,
                           const Image& mesh_ids) {
     TileResult out;
-    if (in.has_meshes) words = see_meshes(g, in, mesh_ids, words, refined);
-    Surface surface = resolve(g, in, words, refined);
-    resolve_instances(g, in, words, refined, surface);
+    const Image& asked = refined != nullptr ? *refined : words;
+    Image seen = words;
+    if (in.has_meshes)
+        seen = see_meshes(g, in, mesh_ids, words, asked);
+    else if (refined != nullptr)
+        seen = settle(g, in, words, asked);
+    Surface surface = resolve(g, in, seen, asked);
+    resolve_instances(g, in, asked, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (in.ao_every > 0) out.evaluations.push_back(g.readback(occlude(g, in, surface)));
-    Image depth;
+    Image depth = depth_of(g, in, surface.seen);
     if (wanted == View::Shaded) {
-        Image radiance = light(g, in, surface.seen, surface);
-        Front front = draw_through(g, in, surface, radiance);
+        Image radiance = light(g, in, surface, depth);
+        Front front = draw_through(g, in, surface, depth, radiance);
         Image moved = in.taa ? motion(g, in, front.seen) : radiance;  // not read without
-        depth = in.through.empty() ? front.depth : depth_of(g, in, surface.seen);
         draw_particles(g, in, depth, front, radiance, moved);
         if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.depth, moved);
         if (in.upscales) {
@@ -191,8 +196,7 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, Image wor
             out.exposure = g.readback(exposure);
         }
     } else {
-        depth = depth_of(g, in, surface.seen);
-        const Shown shown = view(g, in, words, surface, depth);
+        const Shown shown = view(g, in, surface, depth);
         out.radiance = g.readback(shown.values);
         out.shown = g.readback(shown.bytes);
     }
@@ -227,10 +231,13 @@ Seen record_seen(Graph& g, const TileInputs& in) {
 
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
     Seen seen = record_seen(g, in);
-    Image refined = in.refine ? refine(g, in, seen.words) : seen.words;
-    if (in.refine) refine_instances(g, in, seen.words, refined);
+    Image refined;
+    if (in.refine) {
+        refined = refine(g, in, seen.words);
+        refine_instances(g, in, seen.words, refined);
+    }
     if (in.has_meshes && !in.cull_meshes) seen.mesh_ids = draw_clusters(g, in).ids;
-    TileResult out = record_shading(g, in, wanted, seen.words, refined, seen.mesh_ids);
+    TileResult out = record_shading(g, in, wanted, seen.words, in.refine ? &refined : nullptr, seen.mesh_ids);
     out.evaluations.insert(out.evaluations.begin(), seen.evaluations.begin(), seen.evaluations.end());
     out.mesh_numbers = std::move(seen.mesh_numbers);
     return out;
@@ -249,7 +256,8 @@ TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<co
     Image ids;
     if (in.has_meshes)
         ids = mesh_ids.empty() ? draw_clusters(g, in).ids : image_of_words(g, "mesh ids", in.size, mesh_ids);
-    return record_shading(g, in, wanted, words, image_of_words(g, "refined", in.size, refined), ids);
+    const Image asked = image_of_words(g, "refined", in.size, refined);
+    return record_shading(g, in, wanted, words, &asked, ids);
 }
 
 std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
@@ -257,7 +265,7 @@ std::vector<const Kernel*> frame_kernels(const TileInputs& in, View view) {
     if (!in.analytic && (!in.rt || in.has_blends)) out.push_back(&march_kernel(in));
     if (in.exact) out.push_back(&specialised(kMarchExact, in.use));
     if (in.refine) out.push_back(&specialised(kRefine, in.use_of_bricks));
-    out.insert(out.end(), {&resolve_kernel(in), &kDepthOf});
+    out.insert(out.end(), {&kSettle, &resolve_kernel(in), &kDepthOf});
     instance_kernels(in, view == View::Shaded, out);
     if (in.has_meshes) out.insert(out.end(), {&kMeshSee, &kMeshResolve});
     if (in.cull_meshes) out.insert(out.end(), {&kDepthPyramid, &kDepthPyramidRest, &kMeshCull, &kMeshPack, &kMeshPick});

@@ -19,7 +19,7 @@ struct Front {
     Image left;   // share of light from behind it that comes through
 };
 // Radiance with what lets light through.
-Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image& radiance);
+Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth, Image& radiance);
 // Glass along rays where it is nearer than what is solid; in.instances: of_glass().
 Image march_glass(Graph& g, const TileInputs& in, const Image& solid);
 // What glass leaves of lights first_light … + 15: the fractions are less by it, and the colours that the light pass takes.

@@ -19,15 +19,13 @@ void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, I
                 g.read(i.numbers), g.read(in.rays), g.read(visibility), g.write(refined)});
 }
 
-void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined,
-                       Surface& surface) {
+void resolve_instances(Graph& g, const TileInputs& in, const Image& refined, Surface& surface) {
     const InstanceHandles& i = in.instances;
     if (!i) return;
-    g.dispatch(
-        kResolveInstances, in.size,
-        {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records), g.read(in.rays),
-         g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances), g.read(in.field.materials),
-         g.read(visibility), g.read(refined), g.write(surface.words), g.write(surface.seen)});
+    g.dispatch(kResolveInstances, in.size,
+               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.cells), g.read(i.records),
+                g.read(in.rays), g.read(in.field.tables), g.read(in.materials), g.read(in.field.distances),
+                g.read(in.field.materials), g.read(surface.seen), g.read(refined), g.write(surface.words)});
 }
 
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,

@@ -10,8 +10,8 @@ extern const Kernel kRefineInstances, kResolveInstances, kShadowInstances;
 
 // Fills refine()'s words in where they are seen.
 void refine_instances(Graph& g, const TileInputs& in, const Image& visibility, Image& refined);
-// And resolve()'s images.
-void resolve_instances(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined, Surface& surface);
+// And resolve()'s surface.
+void resolve_instances(Graph& g, const TileInputs& in, const Image& refined, Surface& surface);
 // Multiplies what they hide into shadow()'s fractions.
 void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface,
                       const Buffer& light_masks, uint32_t first_light, Image& fractions);

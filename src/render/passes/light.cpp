@@ -26,7 +26,8 @@ const Kernel& light_kernel(const TileInputs& in) {
     return in.image_sky ? kLightImage : kLight;
 }
 
-Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface) {
+Image light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth) {
+    const Image& visibility = surface.seen;
     const Buffer masks = cluster(g, in, visibility);
     const bool batches = in.lights_of_tile > kLightsAtOnce;
     Buffer sums =
@@ -50,7 +51,7 @@ Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surfa
         std::vector<Image> tints;
         if (in.has_glass) tints = shadow_glass(g, in, visibility, surface, masks, first, fractions);
         std::vector<Use> uses{g.uniform(in.frame),    g.read(in.rays),    g.read(in.lights),     g.read(in.ggx_table),
-                              g.read(in.environment), g.read(visibility), g.read(surface.words), g.read(fractions),
+                              g.read(in.environment), g.read(depth),      g.read(surface.words), g.read(fractions),
                               g.read(masks),          g.read_write(sums), g.write(radiance)};
         for (const Image& tint : tints) uses.push_back(g.read(tint));
         if (in.volume_count > 0) {

@@ -14,7 +14,7 @@ layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights[]; };
 layout(set = 0, binding = 3, std430) readonly buffer GgxTable { uint ggx_table[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Environment { uint environment_words[]; };
-layout(set = 0, binding = 5) uniform utexture2D visibility;
+layout(set = 0, binding = 5) uniform texture2D depth;  // all that light asks of visibility words, at a quarter of their size
 layout(set = 0, binding = 6) uniform utexture2D surface_words;
 layout(set = 0, binding = 7) uniform utexture2D visible_fractions;
 layout(set = 0, binding = 8, std430) readonly buffer LightMasks { uint light_masks[]; };
@@ -49,10 +49,10 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
     TexelRay ray = pixel_ray(pixel);
-    uvec4 seen = texelFetch(visibility, pixel, 0);
+    float metres = texelFetch(depth, pixel, 0).r;
     bool first = push.first_light == 0u;
     vec3 sum = vec3(0.0);
-    if ((seen.y >> 28u) == kSeenNothing) {
+    if (isinf(metres)) {
         if (!first) return;
         sum = kImageSky ? environment_radiance(ray.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, ray.direction);
         imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 0.0));
@@ -85,7 +85,7 @@ void main() {
     uvec4 low = texelFetch(tints_low, pixel, 0);
     uvec4 high = texelFetch(tints_high, pixel, 0);
 #endif
-    vec3 p_world = seen_point(ray, seen);
+    vec3 p_world = ray_point(ray, metres / frame.grid.voxel_size);
     for (uint channel = 0u; channel < kLightsAtOnce && index != kNoLight; ++channel) {
         float fraction = visible_fraction(fractions, channel);
         vec3 tint = vec3(1.0);

@@ -6,7 +6,6 @@
 #extension GL_EXT_samplerless_texture_functions : require
 #include "render/passes/frame.gpu.h"
 #include "render/passes/mesh.gpu.h"
-#include "render/passes/refine.gpu.h"
 
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
@@ -21,20 +20,15 @@ layout(set = 0, binding = 7) uniform utexture2D mesh_ids;
 layout(set = 0, binding = 8, rgba32ui) writeonly uniform uimage2D visibility_now;
 
 #include "render/passes/mesh.glsl"
+#include "render/passes/settle.glsl"
 #include "render/passes/rays.glsl"
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
-    uvec4 seen = texelFetch(visibility, pixel, 0);
+    uvec4 seen = settled(texelFetch(visibility, pixel, 0), pixel);
     uvec2 id = texelFetch(mesh_ids, pixel, 0).xy;
     if (id.x != 0u) {
-        uint state = seen.y >> 28u;
-        float t_field = uintBitsToFloat(seen.x);
-        if ((state == kSeenBrick || state == kSeenInstance) && (frame.flags & kFrameRefine) != 0u) {
-            uint asked = texelFetch(refined, pixel, 0).x;
-            if (asked != kNotRefined) t_field = uintBitsToFloat(asked);
-        }
         MeshPart part = mesh_parts[id.y];
         vec3 d = pixel_ray(pixel).direction;
         vec3 a = mesh_point(part, vertex_position(mesh_corner(part, id.x - 1u, 0u)));
@@ -42,7 +36,7 @@ void main() {
         vec3 c = mesh_point(part, vertex_position(mesh_corner(part, id.x - 1u, 2u)));
         vec3 w = mesh_weights_inside(a, b, c, d);
         float t = dot(w.x * a + w.y * b + w.z * c, d) / frame.grid.voxel_size;
-        if (state == kSeenNothing || t < t_field) {
+        if ((seen.y >> 28u) == kSeenNothing || t < uintBitsToFloat(seen.x)) {
             seen.x = floatBitsToUint(t);
             seen.y = (kSeenMesh << 28u) | (id.x - 1u);
             seen.z = id.y;

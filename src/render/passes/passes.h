@@ -25,8 +25,8 @@
 namespace kiln::render {
 
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
-extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kResolve,
-    kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
+extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kSettle,
+    kResolve, kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,
     kShadowLevelsExact, kShadowLevelsHorizons, kCluster, kDepthOf, kLight, kLightImage, kLightGlass, kLightGlassImage,
     kTonemap, kView;
 extern const Kernel kMotion, kTaa, kOutlineMask, kOutlineFlood, kOutlineDraw;
@@ -195,8 +195,10 @@ struct Surface {
 };
 // Metres along the ray of what resolved words see, +infinity where that is nothing.
 Image depth_of(Graph& g, const TileInputs& in, const Image& seen);
-// `refined`: what refine() answers; any image of words without kFrameRefine.
-Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+// The words with t where refine() has the surface.
+Image settle(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
+// `seen`: settled words. `refined`: what refine() answers; any image of words without kFrameRefine.
+Surface resolve(Graph& g, const TileInputs& in, const Image& seen, const Image& refined);
 
 // What the bricks' code says of the points that march found in them; see refine.comp.
 Image refine(Graph& g, const TileInputs& in, const Image& visibility);
@@ -226,7 +228,7 @@ MeshesSeen draw_late(Graph& g, const TileInputs& in, const MeshesEarly& early, c
 // Levels of a pyramid of what a tile shows; see depth_pyramid.gpu.h.
 Buffer depth_pyramid(Graph& g, const TileInputs& in, const Image& mesh_depth, const Image& visibility);
 
-// Visibility words where meshes that are nearer than the field are seen.
+// What settle() answers, with meshes where they are nearer than the field.
 Image see_meshes(Graph& g, const TileInputs& in, const Image& ids, const Image& visibility, const Image& refined);
 // Fills in the surface where meshes are seen.
 void resolve_meshes(Graph& g, const TileInputs& in, Surface& surface);
@@ -243,8 +245,8 @@ Buffer cluster(Graph& g, const TileInputs& in, const Image& visibility);
 Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Buffer& masks,
              const ShadowPush& push);
 const Kernel& light_kernel(const TileInputs& in);
-// Scene-linear radiance, before exposure.
-Image light(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface);
+// Scene-linear radiance, before exposure. `depth`: depth_of() what is seen.
+Image light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth);
 
 // Where each pixel's surface was in the frame before; see motion.comp.
 Image motion(Graph& g, const TileInputs& in, const Image& visibility);
@@ -282,6 +284,6 @@ Image tonemap(Graph& g, const Image& radiance, const Image& glow, const Buffer& 
 struct Shown {
     Image values, bytes;
 };
-Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Image& depth);
+Shown view(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth);
 
 }  // namespace kiln::render

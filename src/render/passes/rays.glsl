@@ -7,10 +7,11 @@ vec3 camera_direction(ivec2 pixel) {
     return camera_direction_at(frame.camera, float(pixel.x) + 0.5, float(pixel.y) + 0.5);
 }
 
-// World metres of what a pixel sees. Whoever lights it calls this, so that all mean the same point.
-vec3 seen_point(TexelRay ray, uvec4 seen) {
-    return (vec3(ray.whole) + (ray.part + ray.direction * uintBitsToFloat(seen.x))) * frame.grid.voxel_size;
+// World metres of the place t voxels along a ray. Whoever lights what a pixel sees calls this, so that all mean the same point.
+vec3 ray_point(TexelRay ray, float t) {
+    return (vec3(ray.whole) + (ray.part + ray.direction * t)) * frame.grid.voxel_size;
 }
+vec3 seen_point(TexelRay ray, uvec4 seen) { return ray_point(ray, uintBitsToFloat(seen.x)); }
 
 TexelRay pixel_ray(ivec2 pixel) {
     if ((frame.flags & kFrameRays) != 0u) {

@@ -6,10 +6,12 @@
 #include "shaders/resolve_exact.spv.h"
 #include "shaders/resolve_levels.spv.h"
 #include "shaders/resolve_levels_exact.spv.h"
+#include "shaders/settle.spv.h"
 
 namespace kiln::render {
 
 const Kernel kDepthOf{"depth", kDepthSpv};
+const Kernel kSettle{"settle", kSettleSpv};
 const Kernel kResolve{"resolve", kResolveSpv};
 const Kernel kResolveExact{"resolve exact", kResolveExactSpv};
 const Kernel kResolveLevels{"resolve levels", kResolveLevelsSpv};
@@ -20,14 +22,18 @@ const Kernel& resolve_kernel(const TileInputs& in) {
     return specialised(in.levels ? kResolveLevelsExact : kResolveExact, in.use);
 }
 
-Surface resolve(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
-    Surface out;
-    out.words = g.create("surface", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-    out.seen = g.create("visibility resolved", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+Image settle(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined) {
+    Image out = g.create("visibility settled", {.size = in.size, .format = rhi::Format::Rgba32Uint});
+    g.dispatch(kSettle, in.size, {g.uniform(in.frame), g.read(visibility), g.read(refined), g.write(out)});
+    return out;
+}
+
+Surface resolve(Graph& g, const TileInputs& in, const Image& seen, const Image& refined) {
+    Surface out{g.create("surface", {.size = in.size, .format = rhi::Format::Rgba32Uint}), seen};
     const FieldHandles& f = in.field;
     std::vector<Use> uses{g.uniform(in.frame), g.read(f.cells),      g.read(f.records),   g.read(in.rays),
                           g.read(f.tables),    g.read(in.materials), g.read(f.distances), g.read(f.materials),
-                          g.read(visibility),  g.read(refined),      g.write(out.words),  g.write(out.seen)};
+                          g.read(seen),        g.read(refined),      g.write(out.words)};
     if (in.exact) {
         uses.insert(uses.end(), {g.read(f.code), g.read(f.program), g.read(f.numbers)});
     }

@@ -13,21 +13,20 @@ layout(set = 0, binding = 4, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 5, std430) readonly buffer MaterialTable { MaterialEntry material_table[]; };
 layout(set = 0, binding = 6) uniform texture3D distances;
 layout(set = 0, binding = 7) uniform utexture3D materials;
-layout(set = 0, binding = 8) uniform utexture2D visibility;
+layout(set = 0, binding = 8) uniform utexture2D visibility;  // with t where the surface is
 layout(set = 0, binding = 9) uniform utexture2D refined;  // see refine.comp; not read without kFrameRefine
 layout(set = 0, binding = 10, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 11, rgba32ui) writeonly uniform uimage2D visibility_now;
 #ifdef KILN_EXACT
-layout(set = 0, binding = 12, std430) readonly buffer Code { uvec2 code[]; };
-layout(set = 0, binding = 13, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
-layout(set = 0, binding = 14, std430) readonly buffer Numbers { float numbers[]; };
+layout(set = 0, binding = 11, std430) readonly buffer Code { uvec2 code[]; };
+layout(set = 0, binding = 12, std430) readonly buffer ProgramCode { uvec2 program_code[]; };
+layout(set = 0, binding = 13, std430) readonly buffer Numbers { float numbers[]; };
 #endif
 
 #ifdef KILN_LEVELS
 #ifdef KILN_EXACT
-const uint kLevelsBinding = 15u;
+const uint kLevelsBinding = 14u;
 #else
-const uint kLevelsBinding = 12u;
+const uint kLevelsBinding = 11u;
 #endif
 layout(set = 0, binding = kLevelsBinding, std140) uniform Levels { LevelsParams levels; LevelPlace level_places[kMostLevels]; };
 #endif
@@ -53,7 +52,6 @@ void main() {
     float t = uintBitsToFloat(seen.x);
     if (state == kSeenInstance) return;  // resolve_instances.comp's
     if (state == kSeenNothing || state == kSeenMesh) {  // meshes: mesh_resolve fills them in
-        imageStore(visibility_now, pixel, seen);
         imageStore(surface_words, pixel, uvec4(0u));
         return;
     }
@@ -62,7 +60,6 @@ void main() {
     uvec4 asked = uvec4(kNotRefined);
     if (state == kSeenBrick && (frame.flags & kFrameRefine) != 0u) asked = texelFetch(refined, pixel, 0);
     if (asked.x != kNotRefined) {
-        t = uintBitsToFloat(asked.x);
         s.normal = unpack_unit(asked.y);
         float share = uintBitsToFloat(asked.w);
         add_material(s, asked.z & 0xffffu, 1.0 - share);
@@ -120,7 +117,5 @@ void main() {
     } else {
         add_material(s, 0u, 1.0);
     }
-    seen.x = floatBitsToUint(t);
-    imageStore(visibility_now, pixel, seen);
     imageStore(surface_words, pixel, pack_surface(s));
 }

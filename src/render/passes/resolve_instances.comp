@@ -19,10 +19,9 @@ layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
 layout(set = 0, binding = 7, std430) readonly buffer MaterialTable { MaterialEntry material_table[]; };
 layout(set = 0, binding = 8) uniform texture3D distances;
 layout(set = 0, binding = 9) uniform utexture3D materials;
-layout(set = 0, binding = 10) uniform utexture2D visibility;
+layout(set = 0, binding = 10) uniform utexture2D visibility;  // with t where the surface is
 layout(set = 0, binding = 11) uniform utexture2D refined;  // see refine.comp; not read without kFrameRefine
 layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D surface_words;
-layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visibility_now;
 
 #include "render/passes/refine.gpu.h"
 #define KILN_FIELD_SURFACE
@@ -47,7 +46,6 @@ void main() {
     uint number1;
     float share;
     if (asked.x != kNotRefined) {
-        t = uintBitsToFloat(asked.x);
         s.normal = unpack_unit(asked.y);
         number0 = asked.z & 0xffffu;
         number1 = asked.z >> 16u;
@@ -68,7 +66,5 @@ void main() {
     }
     add_material(s, number0 == 0u ? instance.material : number0, 1.0 - share);
     if (share > 0.0) add_material(s, number1 == 0u ? instance.material : number1, share);
-    seen.x = floatBitsToUint(t);
-    imageStore(visibility_now, pixel, seen);
     imageStore(surface_words, pixel, pack_surface(s));
 }

@@ -65,11 +65,11 @@ Image solid_along(Graph& g, const TileInputs& in) {
 Image light_along(Graph& g, const TileInputs& in, const Image& seen) {
     Image refined = in.refine ? refine(g, in, seen) : seen;
     if (in.refine) refine_instances(g, in, seen, refined);
-    Surface surface = resolve(g, in, seen, refined);
-    resolve_instances(g, in, seen, refined, surface);
+    Surface surface = resolve(g, in, in.refine ? settle(g, in, seen, refined) : seen, refined);
+    resolve_instances(g, in, refined, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (in.ao_every > 0) (void)occlude(g, in, surface);
-    return light(g, in, surface.seen, surface);
+    return light(g, in, surface, depth_of(g, in, surface.seen));
 }
 
 // Stands for a buffer that a kernel then does not read.
@@ -89,19 +89,20 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
     out.nearest = of_glass.instances ? march_glass(g, of_glass, solid) : solid;
     if (in.has_blends) out.nearest = trace_meshes(g, in, out.nearest, true);
     Image found = g.create("through found", {.size = in.size, .format = rhi::Format::Rgba32Uint});
-    out.surface.seen = g.create("through seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     out.surface.words = g.create("through surface", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kThroughLayer, in.size,
                {g.read(or_any(in.instances.glass, in)), g.read(or_any(in.meshes.parts, in)), g.read(out.nearest),
-                g.read(carried), g.write(found), g.write(out.surface.seen), g.write(out.surface.words)},
+                g.read(carried), g.write(found), g.write(out.surface.words)},
                push);
+    out.surface.seen = found;
     if (of_glass.instances) {
         Image refined = found;
         if (in.refine) {
             refined = g.create("through refined", {.size = in.size, .format = rhi::Format::Rgba32Uint});
             refine_instances(g, of_glass, found, refined);
+            out.surface.seen = settle(g, of_glass, found, refined);
         }
-        resolve_instances(g, of_glass, found, refined, out.surface);
+        resolve_instances(g, of_glass, refined, out.surface);
     }
     if (in.has_blends) resolve_meshes(g, in, out.surface);
     Surface lit = out.surface;
@@ -112,7 +113,7 @@ Layer layer_along(Graph& g, const TileInputs& in, const Image& solid, const Imag
                 g.read(in.rays), g.write(lit.words), g.write(lit.seen)},
                push);
     out.lit_words = lit.words;
-    out.light = light(g, in, lit.seen, lit);
+    out.light = light(g, in, lit, depth_of(g, in, lit.seen));
     return out;
 }
 
@@ -285,12 +286,9 @@ Image march_glass(Graph& g, const TileInputs& in, const Image& solid) {
     return out;
 }
 
-Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, Image& radiance) {
-    Front front{surface.seen, {}, radiance, radiance};
-    if (in.through.empty()) {
-        front.depth = depth_of(g, in, surface.seen);
-        return front;
-    }
+Front draw_through(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth, Image& radiance) {
+    Front front{surface.seen, depth, radiance, radiance};
+    if (in.through.empty()) return front;
     if (wants_front(in)) {
         front.seen = g.create("front seen", {.size = in.size, .format = rhi::Format::Rgba32Uint});
         front.depth = g.create("front depth", {.size = in.size, .format = rhi::Format::R32Float});

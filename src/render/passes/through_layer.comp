@@ -14,8 +14,7 @@ layout(set = 0, binding = 1, std430) readonly buffer Parts { MeshPart mesh_parts
 layout(set = 0, binding = 2) uniform utexture2D nearest;
 layout(set = 0, binding = 3) uniform texture2D carried;
 layout(set = 0, binding = 4, rgba32ui) writeonly uniform uimage2D found;
-layout(set = 0, binding = 5, rgba32ui) writeonly uniform uimage2D seen;  // the same, to be refined
-layout(set = 0, binding = 6, rgba32ui) writeonly uniform uimage2D surface_words;
+layout(set = 0, binding = 5, rgba32ui) writeonly uniform uimage2D surface_words;
 layout(push_constant) uniform Push { ThroughPush push; };
 
 void main() {
@@ -29,6 +28,5 @@ void main() {
     if ((push.step & kThroughCamera) == 0u && texelFetch(carried, pixel, 0).a == kRayRests) through = false;
     if (!through) word = uvec4(0x7f800000u, kSeenNothing << 28u, 0u, 0u);
     imageStore(found, pixel, word);
-    imageStore(seen, pixel, word);
     imageStore(surface_words, pixel, uvec4(0u));
 }

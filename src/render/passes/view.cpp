@@ -7,12 +7,12 @@ namespace kiln::render {
 
 const Kernel kView{"view", kViewSpv};
 
-Shown view(Graph& g, const TileInputs& in, const Image& visibility, const Surface& surface, const Image& depth) {
+Shown view(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth) {
     Shown out;
     out.values = g.create("view values", {.size = in.size, .format = rhi::Format::Rgba32Float});
     out.bytes = g.create("view bytes", {.size = in.size, .format = rhi::Format::Rgba8Unorm});
     g.dispatch(kView, in.size,
-               {g.uniform(in.frame), g.read(visibility), g.read(surface.words), g.read(depth), g.write(out.values),
+               {g.uniform(in.frame), g.read(surface.seen), g.read(surface.words), g.read(depth), g.write(out.values),
                 g.write(out.bytes)});
     return out;
 }
