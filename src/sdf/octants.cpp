@@ -31,9 +31,9 @@ bool is_join(Instruction in) {
 }
 
 bool is_moved_ball_or_box(std::span<const Instruction> content) {
-    return content.size() == 2 && (content[0].opcode() == Opcode::PointTranslate || content[0].opcode() == Opcode::PointCell) &&
-           content[1].opcode() == Opcode::Shape &&
-           (content[1].aux() == kFusedSphere || content[1].aux() == kFusedBox);
+    return content.size() == 2 &&
+           (content[0].opcode() == Opcode::PointTranslate || content[0].opcode() == Opcode::PointCell) &&
+           content[1].opcode() == Opcode::Shape && (content[1].aux() == kFusedSphere || content[1].aux() == kFusedBox);
 }
 
 }  // namespace
@@ -151,7 +151,8 @@ void OctantCodes::write(int octant, Want want, std::vector<Instruction>& out) co
             material = false;
         }
         out.push_back(join);
-        const auto leaf = std::find_if(content.begin(), content.end(), [](Instruction in) { return in.has_material(); });
+        const auto leaf =
+            std::find_if(content.begin(), content.end(), [](Instruction in) { return in.has_material(); });
         if (won && shown && content.size() > 1 && leaf != content.end() && std::next(leaf) == content.end()) {
             out.push_back(Instruction::make(Opcode::Constant, 0, 1, 0, 0, leaf->param));  // no tree: its material alone
         } else {

@@ -47,7 +47,8 @@ private:
 
 /// Texel (i, j, k) of a brick, i fastest, that is texel `t` of an octant, likewise counted.
 inline constexpr int texel_of_octant(int octant, int t) {
-    const int i = (octant & 1) * 4 + (t & 3), j = (octant >> 1 & 1) * 4 + (t >> 2 & 3), k = (octant >> 2) * 4 + (t >> 4);
+    const int i = (octant & 1) * 4 + (t & 3), j = (octant >> 1 & 1) * 4 + (t >> 2 & 3),
+              k = (octant >> 2) * 4 + (t >> 4);
     return (k * 8 + j) * 8 + i;
 }
 

@@ -56,7 +56,8 @@ TEST(OctantCodes, HaveTheBitsOfTheWholeCodeInDistanceAndMaterials) {
                 if (!codes.cut(tape, brick.x, brick.y, brick.z, isa)) continue;
                 ++cut;
                 EXPECT_EQ(codes.evaluate(got.data()), least) << "seed " << seed;
-                EXPECT_EQ(std::memcmp(got.data(), expected.data(), 512 * sizeof(float)), 0) << "seed " << seed << " isa " << int(isa);
+                EXPECT_EQ(std::memcmp(got.data(), expected.data(), 512 * sizeof(float)), 0)
+                    << "seed " << seed << " isa " << int(isa);
                 for (int octant = 0; octant < OctantCodes::kOctants; ++octant) {
                     const std::span<const Instruction> code = codes.material_code(octant);
                     whole += tape.code.size();

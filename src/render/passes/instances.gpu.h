@@ -44,7 +44,7 @@ struct InstanceNode {
 };
 KILN_CONST uint kNoInstance = 0xffffffffu;
 // Kernels read nodes from an image, two texels a node, so many nodes a row: a software device fetches a texel at once, and a buffer word by word.
-KILN_CONST uint kNodesARow = 256u;
+KILN_CONST uint kNodesARow = 1024u;
 
 struct InstancePush {
     uint node_count;
