@@ -59,8 +59,8 @@ TEST_F(FrameCostGpu, EveryPassTellsItsBytesAndTransientsShareTheirMemory) {
     EXPECT_LE(double(s.transient_peak_bytes), 0.6 * double(s.transient_sum_bytes));
 }
 
-// Six tenths of the sum, or a tenth more than what one pass reads and writes: of a frame of few passes that is more, and no order and no packing
-// can go below it. (The tenth: passes that do not wait for each other run side by side.)
+// Six tenths of the sum; at low, where passes are few, and where a pass fills a shadow map larger than the picture, or a tenth more than what one
+// pass reads and writes, since no order and no packing can go below that. (The tenth: passes that do not wait for each other run side by side.)
 TEST_F(FrameCostGpu, NoFrameHoldsMoreThanItsHeaviestPassNeedsOrSixTenthsOfAll) {
     Frame bare = scene();
     bare.meshes.clear();
@@ -71,9 +71,10 @@ TEST_F(FrameCostGpu, NoFrameHoldsMoreThanItsHeaviestPassNeedsOrSixTenthsOfAll) {
             set_quality(settings, q);
             (void)rhi::must(renderer->render(frame, settings));
             const RenderStats& s = renderer->stats();
-            EXPECT_LE(double(s.transient_peak_bytes),
-                      std::max(0.6 * double(s.transient_sum_bytes), 1.1 * double(s.transient_pass_bytes)))
-                << int(q) << ", meshes " << frame.meshes.size();
+            const double share = double(s.transient_peak_bytes) / double(s.transient_sum_bytes);
+            const double pass = 1.1 * double(s.transient_pass_bytes) / double(s.transient_sum_bytes);
+            const bool plain = frame.meshes.empty() && q != Quality::Low;
+            EXPECT_LE(share, plain ? 0.6 : std::max(0.6, pass)) << int(q) << ", meshes " << frame.meshes.size();
         }
     }
 }
