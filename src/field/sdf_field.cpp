@@ -2,6 +2,7 @@
 
 #include "field/sdf_field.h"
 
+#include "sdf/octants.h"
 #include "sdf/prune.h"
 
 #include <algorithm>
@@ -182,7 +183,9 @@ bool ProgramField::texels(vec3 center, float side, float near, const float* x, c
     const float value =
         sdf::prune(regions_.tape_around(to_double(center), 0.5 * double(side)), center, radius, code, scratch);
     if (!(std::abs(value) <= near + radius)) return false;
-    (void)sdf::evaluate_brick(sdf::view(*program_, code), x, y, z, out);
+    thread_local sdf::OctantCodes octants;
+    const sdf::TapeView tape = sdf::view(*program_, code);
+    (void)(octants.cut(tape, x, y, z) ? octants.evaluate(out) : sdf::evaluate_brick(tape, x, y, z, out));
     return true;
 }
 
