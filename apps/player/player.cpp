@@ -369,10 +369,6 @@ Result<void> Player::use_tools() {
     if (!picked) return picked.error();
     const RayHit* const hit = &picked->hit;
     if (!hit->hit) return {};
-    if (!picked->body.empty() && !hit->edit) {
-        message("this is a mesh, which is not cut");
-        return {};
-    }
     const float radius = std::clamp(kBiteOfDistance * hit->t, kLeastBite, kMostBite);
     const vec3 at = digs ? hit->position : hit->position + hit->normal * (0.5f * radius);
     // A mouse that stays where it is drills on slowly, however deep the last bite was.

@@ -123,6 +123,31 @@ TEST_F(View, GpuAReplayDigsWhatIsCutFallsAndUndoPutsTheWorldBackTheSameOnEveryRu
     EXPECT_EQ(read("a.jsonl"), read("b.jsonl"));
 }
 
+TEST_F(View, GpuAStrokeCutsABodyOfAMeshAndUndoBringsTheMeshBack) {
+    write("cube.obj",
+          "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n"
+          "f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+    write("crate.kiln.json",
+          R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "ground", "shape": "plane"}],
+      "meshes": [{"id": "m", "file": "cube.obj", "position": [-0.5, 0, -0.5]}], "bodies": [{"id": "crate", "mesh": "m"}],
+      "cameras": {"main": {"position": [0, 0.5, 4], "target": [0, 0.5, 0]}}})");
+    // Before the stroke, after it, and after it was taken back.
+    const std::string words = "view crate.kiln.json --size 64x36 --keys dig.jsonl --ui-json ui.jsonl";
+    std::vector<std::string> pictures;
+    for (const int frames : {2, 30, 60}) {
+        const std::string name = std::to_string(frames) + ".png";
+        const Outcome ran = run(words + " --frames " + std::to_string(frames) + " --screenshot " + name);
+        ASSERT_EQ(ran.code, 0) << ran.err;
+        EXPECT_EQ(value("ui.jsonl", frames - 1, "undo_depth"), frames == 30 ? "1" : "0");
+        EXPECT_EQ(value("ui.jsonl", frames - 1, "bodies"), "1");
+        pictures.push_back(read(name));
+    }
+    EXPECT_NE(pictures[0], pictures[1]);
+    EXPECT_NE(pictures[1], pictures[2]);
+    // What is cut from a body is the play's own: the world has not changed.
+    EXPECT_EQ(value("ui.jsonl", 0, "world"), value("ui.jsonl", 59, "world"));
+}
+
 TEST_F(View, SlowGpuTheQuarryIsDugAndUndoneTheSameOnEveryRun) {
     write("quarry.jsonl", R"({"frame": 1, "mouse": [32, 16], "button": "left", "down": true}
 {"frame": 2, "button": "left", "down": false}
