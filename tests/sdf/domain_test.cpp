@@ -27,7 +27,7 @@ struct Bare {
     uint32_t kind;
     Params w;
     text32::Bounds bounds;
-    explicit Bare(Random& random) : kind(0), w{}, bounds{{0, 0, 0}, {0, 0, 0}} {
+    explicit Bare(RandomValues& random) : kind(0), w{}, bounds{{0, 0, 0}, {0, 0, 0}} {
         do {
             kind = uint32_t(random.below(primitive_count()));
             w = shape_rows()[kind].how == KindRow::Sampled ? Params{} : random.params(shape_rows()[kind]);
@@ -71,7 +71,7 @@ Edit entry_over(uint32_t kind, const Params& w, const Bare& bare) {
 
 TEST_P(EachWarp, StaysOneLipschitzOverEveryShape) {
     int refused = 0, tried = 0;
-    for_all(name() + ": Lipschitz", [&](Random& random) {
+    for_all(name() + ": Lipschitz", [&](RandomValues& random) {
         const Bare bare(random);
         Params w = random.params(row());
         if (name() == "repeat") {  // most shapes fit
@@ -147,7 +147,7 @@ std::vector<Point> bare_points(std::string_view entry, const Params& f, const Po
 
 TEST_P(EachWarp, SolidIsTheImageOfTheBareOne) {
     int64_t solid = 0, empty = 0;
-    for_all(name() + ": solid", [&](Random& random) {
+    for_all(name() + ": solid", [&](RandomValues& random) {
         const Bare bare(random);
         Params w = random.params(row());
         if (name() == "repeat") {
@@ -206,7 +206,7 @@ double stretch(uint32_t kind, const Params& w, const Point& p, double h) {
 TEST_P(EachWarp, FactorIsTheLargestStretchIntoTheRegion) {
     if (row().how == KindRow::Value) GTEST_SKIP() << "moves no points";
     double closest = 0;
-    for_all(name() + ": stretch", [&](Random& random) {
+    for_all(name() + ": stretch", [&](RandomValues& random) {
         const Params w = random.params(row());
         for (int i = 0; i < 40; ++i) {
             const Point p{random.in(-1.5, 1.5), random.in(-1.5, 1.5), random.in(-1.5, 1.5)};
@@ -232,7 +232,7 @@ TEST_P(EachWarp, FactorIsTheLargestStretchIntoTheRegion) {
 TEST_P(EachWarp, BoundsHoldTheSolid) {
     if (name() == "repeat") GTEST_SKIP() << "tested below";
     int64_t solid = 0;
-    for_all(name() + ": bounds", [&](Random& random) {
+    for_all(name() + ": bounds", [&](RandomValues& random) {
         const Bare bare(random);
         if (shape_rows()[bare.kind].how != KindRow::Exact)
             return;  // a lower bound may grow by more than round's radius
@@ -256,7 +256,7 @@ TEST_P(EachWarp, BoundsHoldTheSolid) {
 
 TEST_P(EachWarp, FloatAgreesWithDouble) {
     if (name() == "repeat") GTEST_SKIP() << "tested below";
-    for_all(name() + ": float = double", [&](Random& random) {
+    for_all(name() + ": float = double", [&](RandomValues& random) {
         const Params w = random.params(row());
         const Point p{double(float(random.in(-3, 3))), double(float(random.in(-3, 3))),
                       double(float(random.in(-3, 3)))};
@@ -289,7 +289,7 @@ TEST_P(EachWarp, FloatAgreesWithDouble) {
 
 void expect_inverse(const char* warp, const std::function<Point(const Params&, const Point&)>& forward, double range) {
     const uint32_t kind = *warp_kind(warp);
-    for_all(std::string(warp) + " undoes the forward map", [&](Random& random) {
+    for_all(std::string(warp) + " undoes the forward map", [&](RandomValues& random) {
         const Params w = random.params(warp_rows()[kind]);
         const Point bare{random.in(-range, range), random.in(-range, range), random.in(-range, range)};
         const Point p = forward(w, bare);
@@ -334,7 +334,7 @@ TEST(Bend, ABarGoesAllTheWayRoundAndOn) {
         const Edit edit = bent(Box{.half_extents = {float(M_PI * turns), 0.05f, 0.05f}}, 1);
         const Result<Program> program = compile({{&edit, 1}, {}, {}});
         ASSERT_TRUE(program) << turns << ": " << program.error().message;
-        Random random(1);
+        RandomValues random(1);
         for (int i = 0; i < 2000; ++i) {
             const double angle = random.in(-M_PI, M_PI), r = random.in(0.5, 1.5), z = random.in(-0.5, 0.5);
             const Point p{r * std::sin(angle), 1 - r * std::cos(angle), z};
@@ -425,7 +425,7 @@ TEST(Round, MovesTheSurfaceOut) {
 
 TEST(Repeat, TwoCopiesAnAxisFindTheNearestOfAll) {
     const uint32_t kind = *warp_kind("repeat");
-    for_all("nearest of all copies", [&](Random& random) {
+    for_all("nearest of all copies", [&](RandomValues& random) {
         // A capsule off its centre and turned in the xy-plane; cells are centred on its bounds.
         const double angle = random.in(-3, 3), half = random.in(0, 0.3), radius = random.in(0.05, 0.2);
         const Point at{random.in(-5, 5), random.in(-5, 5), random.in(-5, 5)};
@@ -500,7 +500,7 @@ double reference_noise(const Point& p, uint32_t seed) {
 }
 
 TEST(Displace, IsTheDocumentedNoise) {
-    for_all("noise", [](Random& random) {
+    for_all("noise", [](RandomValues& random) {
         const double reach = random.one_in(4) ? 1e6 : 10;
         const Point p{random.in(-reach, reach), random.in(-reach, reach), random.in(-reach, reach)};
         const uint32_t seed = uint32_t(random.below(16777216));
@@ -624,7 +624,7 @@ TEST(Displace, NoiseIsNeverSteeper) {
 }
 
 TEST(Displace, TheProofIsAboutThisNoise) {
-    for_all("slope of the noise", [](Random& random) {
+    for_all("slope of the noise", [](RandomValues& random) {
         const Point p{random.in(-5, 5), random.in(-5, 5), random.in(-5, 5)};
         const double h = 1e-5;
         double g[3];
@@ -647,7 +647,7 @@ TEST(Displace, TheProofIsAboutThisNoise) {
 
 TEST(Domain, StacksOfWarpsStayOneLipschitzThroughTheProgram) {
     int compiled = 0;
-    for_all("stacks", [&](Random& random) {
+    for_all("stacks", [&](RandomValues& random) {
         const Bare bare(random);
         Edit edit;
         edit.name = "stack";

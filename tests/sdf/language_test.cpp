@@ -8,7 +8,7 @@ namespace {
 
 TEST(Language, SineAndCosineAreWithinTheirStatedError) {
     double worst = 0;
-    Random random(1);
+    RandomValues random(1);
     for (int i = 0; i < 400000; ++i) {
         const float x = float(i % 2 == 0 ? random.in(-1e4, 1e4) : random.in(-7, 7));
         worst = std::max(worst, std::fabs(double(text32::sin_of(x)) - std::sin(double(x))));
@@ -19,7 +19,7 @@ TEST(Language, SineAndCosineAreWithinTheirStatedError) {
 
 TEST(Language, ArcTangentIsWithinItsStatedErrorInEveryQuadrant) {
     double worst = 0;
-    Random random(2);
+    RandomValues random(2);
     for (int i = 0; i < 400000; ++i) {
         const float y = float(random.in(-1, 1) * std::pow(10, random.in(-6, 6)));
         const float x = float(random.in(-1, 1) * std::pow(10, random.in(-6, 6)));
@@ -34,7 +34,7 @@ TEST(Language, ArcTangentIsWithinItsStatedErrorInEveryQuadrant) {
 
 TEST(Language, ExponentialAndLogarithmAreWithinTheirStatedErrorAndCutOffOutside) {
     double worst_exp = 0, worst_log = 0;
-    Random random(3);
+    RandomValues random(3);
     for (int i = 0; i < 400000; ++i) {
         const float x = float(i % 2 == 0 ? random.in(-87, 88) : random.in(-1, 1));
         worst_exp = std::max(worst_exp, std::fabs(double(text32::exp_of(x)) / std::exp(double(x)) - 1));

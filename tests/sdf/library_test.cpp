@@ -46,7 +46,7 @@ TEST_P(EachComposite, IsATreeOfPrimitivesWithoutMaterials) {
 }
 
 TEST_P(EachComposite, IsOneLipschitzInsideItsBoundsForAnyParameters) {
-    for_all(name(), [&](Random& random) {
+    for_all(name(), [&](RandomValues& random) {
         const Params w = random.params(row());
         const Edit e = edit(w);
         const Result<Program> program = compile({{&e, 1}, {}, {}});
@@ -115,7 +115,7 @@ TEST_P(EachComposite, GrowsWithItsLength) {
     const Result<Program> a = compile({{&one, 1}, {}, {}}), b = compile({{&three, 1}, {}, {}});
     ASSERT_TRUE(a);
     ASSERT_TRUE(b);
-    Random random(1);
+    RandomValues random(1);
     for (int i = 0; i < 500; ++i) {
         const dvec3 p{random.in(-1, 1), random.in(-1, 1), random.in(-1, 1)};
         EXPECT_NEAR(evaluate(view(*b), {3 * p.x, 3 * p.y, 3 * p.z}), 3 * evaluate(view(*a), p), 1e-5);
@@ -133,7 +133,7 @@ TEST(Planet, StaysWithinItsReliefAndChangesWithTheSeed) {
         }();
         const Result<Program> program = compile({{&e, 1}, {}, {}});
         ASSERT_TRUE(program);
-        Random random(3);
+        RandomValues random(3);
         for (int i = 0; i < 2000; ++i) {
             vec3 n = normalize({float(random.in(-1, 1)), float(random.in(-1, 1)), float(random.in(-1, 1))});
             const auto at = [&](float r) {

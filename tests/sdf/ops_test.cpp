@@ -29,14 +29,14 @@ constexpr Op kOps[] = {Op::Union, Op::Subtract, Op::Intersect};
 
 struct Operands {
     double a, b, k;
-    explicit Operands(Random& random)
+    explicit Operands(RandomValues& random)
         : a(random.in(-2, 2)),
           b(random.one_in(4) ? a : random.in(-2, 2)),
           k(random.one_in(4) ? 0 : random.in(0.01, 3)) {}
 };
 
 TEST(Ops, AreTheClosedForm) {
-    for_all("closed form", [](Random& random) {
+    for_all("closed form", [](RandomValues& random) {
         const Operands o(random);
         for (Op op : kOps) {
             RC_ASSERT(std::fabs(text64::op_distance(uint32_t(op), o.a, o.b, o.k) - closed(op, o.a, o.b, o.k)) < 1e-14);
@@ -47,7 +47,7 @@ TEST(Ops, AreTheClosedForm) {
 }
 
 TEST(Ops, ShareIsTheDerivativeByTheSecondOperand) {
-    for_all("share", [](Random& random) {
+    for_all("share", [](RandomValues& random) {
         const Operands o(random);
         const double h = 1e-6;
         if (std::fabs(std::fabs(o.a - o.b) - o.k) < 1e-4 || std::fabs(o.a - o.b) < 1e-4) return;  // kinks
@@ -69,7 +69,7 @@ TEST(Ops, TwoEqualOperandsShareHalfWhenSmooth) {
 }
 
 TEST(Ops, ScaleWithTheirOperands) {
-    for_all("smin(s a, s b, s k) = s smin(a, b, k)", [](Random& random) {
+    for_all("smin(s a, s b, s k) = s smin(a, b, k)", [](RandomValues& random) {
         const Operands o(random);
         const double s = random.in(0.1, 10);
         for (Op op : kOps) {
@@ -80,7 +80,7 @@ TEST(Ops, ScaleWithTheirOperands) {
 }
 
 TEST(Ops, BeyondTheBlendKeepTheBitsOfTheHardOperation) {
-    for_all("no blend where |a - b| >= k", [](Random& random) {
+    for_all("no blend where |a - b| >= k", [](RandomValues& random) {
         const float a = float(random.in(-2, 2));
         const float k = float(random.in(0, 1));
         const float b = a + (random.one_in(2) ? 1.0f : -1.0f) * (k + float(random.in(1e-3, 1)));

@@ -24,7 +24,7 @@ struct Scene {
 
 constexpr int kAny = -1;
 
-Shape random_shape(Random& random, int kind = kAny) {
+Shape random_shape(RandomValues& random, int kind = kAny) {
     Shape out;
     out.kind = uint16_t(kind == kAny ? random.below(int(shape_rows().size())) : kind);
     if (shape_rows()[out.kind].how == KindRow::Custom) out.kind = 0;  // another test's
@@ -44,7 +44,7 @@ Shape random_shape(Random& random, int kind = kAny) {
     return out;
 }
 
-Warp random_warp(Random& random, int kind = kAny) {
+Warp random_warp(RandomValues& random, int kind = kAny) {
     Warp out;
     out.kind = uint16_t(kind == kAny ? random.below(int(warp_rows().size())) : kind);
     out.params = random.params(warp_rows()[out.kind]);
@@ -57,7 +57,7 @@ Warp random_warp(Random& random, int kind = kAny) {
     return out;
 }
 
-Transform random_transform(Random& random) {
+Transform random_transform(RandomValues& random) {
     Transform out;
     const auto number = [&] { return float(random.in(-1, 1)); };
     out.position = {number(), number(), number()};
@@ -68,13 +68,13 @@ Transform random_transform(Random& random) {
     return out;
 }
 
-void dress(Random& random, Node& node) {
+void dress(RandomValues& random, Node& node) {
     node.transform = random_transform(random);
     for (int n = random.below(3); n > 0; --n) node.domain.push_back(random_warp(random));
 }
 
 // A tree of up to `most` nodes; leaves may place one of the objects before `objects`.
-Object random_tree(Random& random, int most, int objects) {
+Object random_tree(RandomValues& random, int most, int objects) {
     Object out;
     out.nodes.emplace_back();
     for (size_t n = 0; n < out.nodes.size(); ++n) {
@@ -125,7 +125,7 @@ std::string describe(const Scene& scene) {
 double off(double x, float lo, float hi) { return std::max({double(lo) - x, x - double(hi), 0.0}); }
 
 // A point beyond at least one finite face, near or far; nothing where every face is infinite.
-bool outside_point(Random& random, const Box3& box, double size, Point& p) {
+bool outside_point(RandomValues& random, const Box3& box, double size, Point& p) {
     const float lo[3] = {box.min.x, box.min.y, box.min.z}, hi[3] = {box.max.x, box.max.y, box.max.z};
     bool any = false;
     for (size_t a = 0; a < 3; ++a) {
@@ -142,7 +142,7 @@ bool outside_point(Random& random, const Box3& box, double size, Point& p) {
 }
 
 // The smallest value / (rate · distance) seen; infinite where the scene does not compile or nothing is outside.
-double expect_rate(Random& random, const Scene& scene, int points) {
+double expect_rate(RandomValues& random, const Scene& scene, int points) {
     double tightest = std::numeric_limits<double>::infinity();
     const Result<Program> program = compile(scene.source());
     if (!program) return tightest;
@@ -174,7 +174,7 @@ Around around_edit(const Program& program) {
     return Around({{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}});
 }
 
-void expect_one_lipschitz(Random& random, const Scene& scene, int points) {
+void expect_one_lipschitz(RandomValues& random, const Scene& scene, int points) {
     const Result<Program> program = compile(scene.source());
     if (!program) return;
     const Around around = around_edit(*program);
@@ -194,7 +194,7 @@ INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachShape, testing::Range(0, int(shape_rows(
                          [](const auto& row) { return std::string(shape_rows()[size_t(row.param)].name); });
 
 TEST_P(RateOfEachShape, IsOneUnderUniformScaleAndHoldsUnderAny) {
-    for_all("shape", [&](Random& random) {
+    for_all("shape", [&](RandomValues& random) {
         Scene scene;
         scene.node().shape = random_shape(random, GetParam());
         scene.node().transform = random_transform(random);
@@ -214,7 +214,7 @@ INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachWarp, testing::Range(0, int(warp_rows().
 
 TEST_P(RateOfEachWarp, AndSlopeHoldOverShapesOfAnyScale) {
     int judged = 0;
-    for_all("warp", [&](Random& random) {
+    for_all("warp", [&](RandomValues& random) {
         Scene scene;
         Object squeezed;
         squeezed.nodes.emplace_back();
@@ -236,7 +236,7 @@ TEST_P(RateOfEachWarp, AndSlopeHoldOverShapesOfAnyScale) {
 TEST(Rate, HoldsOverRandomTrees) {
     int judged = 0;
     for (int round = 0; round < 10; ++round) {
-        for_all("trees", [&](Random& random) {
+        for_all("trees", [&](RandomValues& random) {
             Scene scene;
             for (int o = 0; o < 3; ++o) scene.objects.push_back(random_tree(random, 12, o));
             scene.node().kind = Node::Kind::Object;
@@ -251,7 +251,7 @@ TEST(Rate, HoldsOverRandomTrees) {
 TEST(Trees, AreOneLipschitzAndTheJudgesValue) {
     int judged = 0;
     for (int round = 0; round < 5; ++round) {
-        for_all("trees", [&](Random& random) {
+        for_all("trees", [&](RandomValues& random) {
             Scene scene;
             for (int o = 0; o < 2; ++o) scene.objects.push_back(random_tree(random, 8, o));
             scene.node().kind = Node::Kind::Object;
@@ -314,7 +314,7 @@ TEST(Rate, RoundOfASqueezedBallReachesFarther) {
     for (const Warp& warp : {Warp(Round{.radius = 0.2f}), Warp(Shell{.thickness = 0.4f})}) {
         scene.node().domain = {warp};
         EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0, 0, 4.1}), 0) << "beyond 3 + 0.2";
-        for_all("squeezed", [&](Random& random) { expect_rate(random, scene, 200); });
+        for_all("squeezed", [&](RandomValues& random) { expect_rate(random, scene, 200); });
     }
 }
 
@@ -328,7 +328,7 @@ TEST(Slope, WhereTheEndsOfAnUnevenBarMeetTheValueDoesNotJump) {
     scene.node().object = ObjectId{0, 0};
     scene.node().domain = {Bend{.curvature = 1}};
     ASSERT_TRUE(compile(scene.source()));
-    for_all("seam", [&](Random& random) { expect_one_lipschitz(random, scene, 1000); });
+    for_all("seam", [&](RandomValues& random) { expect_one_lipschitz(random, scene, 1000); });
     const auto at = [&](double x, double y) { return evaluate(view(*compile(scene.source())), dvec3{x, y, 0}); };
     EXPECT_NEAR(at(1e-6, 2.4), at(-1e-6, 2.4), 1e-5) << "beyond the thin end, beside the thick one";
 }
@@ -344,7 +344,7 @@ TEST(Slope, NearTheCentreOfABendHoldsForAChildThatGrowsSlowly) {
     scene.node().domain = {Bend{.curvature = 1}};
     const auto program = compile(scene.source());
     ASSERT_TRUE(program);
-    Random random(5);
+    RandomValues random(5);
     for (int i = 0; i < 20000; ++i) {
         const Point p{random.in(-0.4, 0.4), random.in(0.6, 1.4), random.in(-0.4, 0.4)};
         const Point q = beside(random, p, 0.01);
@@ -357,13 +357,13 @@ TEST(Slope, NearTheCentreOfABendHoldsForAChildThatGrowsSlowly) {
 TEST(Rate, ManyBlendedBallsOnOneSpotBulgeFartherThanTwo) {
     const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(6, shaped(Sphere{.radius = 0.5f})));
     EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0.7, 0, 0}), 0) << "a pair reaches 0.6";
-    for_all("balls", [&](Random& random) { expect_rate(random, scene, 200); });
+    for_all("balls", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 TEST(Rate, SqueezedOnesBulgeByTheirRateFarther) {
     const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(2, shaped(Sphere{.radius = 0.5f}, {1, 1, 4})));
     EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0, 0, 2.35}), 0) << "the pair alone reaches 2";
-    for_all("balls", [&](Random& random) { expect_rate(random, scene, 200); });
+    for_all("balls", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 TEST(Rate, DisplacedGroundIsBoundedByItsHighestHill) {
@@ -374,7 +374,7 @@ TEST(Rate, DisplacedGroundIsBoundedByItsHighestHill) {
     ASSERT_TRUE(program && std::isfinite(program->edits[0].bounds.max.y));
     EXPECT_EQ(program->edits[0].rate, 1);
     EXPECT_NEAR(evaluate(view(*program), dvec3{0, 100, 0}), 99.8, 1e-5);
-    for_all("ground", [&](Random& random) { expect_rate(random, scene, 200); });
+    for_all("ground", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 TEST(Rate, AnIntersectionsBoxIsFartherThanAnyOfItsOperands) {
@@ -384,7 +384,7 @@ TEST(Rate, AnIntersectionsBoxIsFartherThanAnyOfItsOperands) {
     const auto program = compile(scene.source());
     EXPECT_NEAR(program->edits[0].rate, 1 / std::sqrt(3.0f), 1e-6f);
     EXPECT_NEAR(evaluate(view(*program), dvec3{1.2, 1.2, 1.2}), 1, 1e-6) << "sqrt(3) from the box";
-    for_all("corner", [&](Random& random) { expect_rate(random, scene, 200); });
+    for_all("corner", [&](RandomValues& random) { expect_rate(random, scene, 200); });
     const Scene one =
         folded(Op::Intersect, 0, {shaped(Sphere{.radius = 2}), shaped(Box{.half_extents = {0.2f, 0.2f, 0.2f}})});
     EXPECT_EQ(compile(one.source())->edits[0].rate, 1) << "every face is the box's";
@@ -398,7 +398,7 @@ TEST(Rate, AGapPulledOpenBesideTheShapeIsInsideItsBounds) {
     scene.node().kind = Node::Kind::Object;
     scene.node().object = ObjectId{0, 0};
     scene.node().domain = {Elongate{.half_extents = {2, 0, 0}}};
-    for_all("gap", [&](Random& random) { expect_rate(random, scene, 200); });
+    for_all("gap", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 }  // namespace

@@ -180,7 +180,7 @@ bool inside(std::string_view name, const Params& f, const Point& p) {
 }
 
 TEST_P(EachShape, SignAgreesWithAnIndependentDefinition) {
-    for_all(name() + ": sign", [&](Random& random) {
+    for_all(name() + ": sign", [&](RandomValues& random) {
         const Params w = random.params(row());
         const Around around(text32::shape_bounds(kind(), w.data()));
         for (int i = 0; i < 200; ++i) {
@@ -195,7 +195,7 @@ TEST_P(EachShape, SignAgreesWithAnIndependentDefinition) {
 }
 
 TEST_P(EachShape, IsOneLipschitz) {
-    for_all(name() + ": |f(p) - f(q)| <= |p - q|", [&](Random& random) {
+    for_all(name() + ": |f(p) - f(q)| <= |p - q|", [&](RandomValues& random) {
         const Params w = random.params(row());
         const Around around(text32::shape_bounds(kind(), w.data()));
         for (int i = 0; i < 100; ++i) {
@@ -217,7 +217,7 @@ TEST_P(EachShape, IsOneLipschitz) {
 }
 
 TEST_P(EachShape, FloatAgreesWithDouble) {
-    for_all(name() + ": float = double within 1e-5", [&](Random& random) {
+    for_all(name() + ": float = double within 1e-5", [&](RandomValues& random) {
         const Params w = random.params(row());
         const Around around(text32::shape_bounds(kind(), w.data()));
         for (int i = 0; i < 200; ++i) {
@@ -231,7 +231,7 @@ TEST_P(EachShape, FloatAgreesWithDouble) {
 }
 
 TEST_P(EachShape, IsFiniteAtDegenerateAndFarPoints) {
-    for_all(name() + ": finite", [&](Random& random) {
+    for_all(name() + ": finite", [&](RandomValues& random) {
         const Params w = random.params(row());
         const double special[] = {0.0,  -0.0,         1e-38,         1e-30,        -1e-20,      1e6,
                                   -1e6, double(w[0]), -double(w[0]), double(w[1]), double(w[2])};
@@ -248,7 +248,7 @@ TEST_P(EachShape, IsFiniteAtDegenerateAndFarPoints) {
 TEST_P(EachShape, ExactOnesAreExactOutside) {
     if (row().how != KindRow::Exact) GTEST_SKIP() << name() << " is a lower bound";
     int tried = 0, unclear = 0;
-    for_all(name() + ": p - f grad f lies on the surface", [&](Random& random) {
+    for_all(name() + ": p - f grad f lies on the surface", [&](RandomValues& random) {
         const Params w = random.params(row());
         const Around around(text32::shape_bounds(kind(), w.data()));
         for (int i = 0; i < 50; ++i) {
@@ -285,7 +285,7 @@ TEST_P(EachShape, ExactOnesAreExactOutside) {
 // From far away along +x the distance is the way to the supporting plane, but for (size² / far): the face of the tightest box.
 TEST_P(EachShape, BoundsAreTheTightestBox) {
     const bool of_box = row().how == KindRow::Sampled;  // its far distance is its box's, whatever the ground
-    for_all(name() + ": tight bounds", [&](Random& random) {
+    for_all(name() + ": tight bounds", [&](RandomValues& random) {
         const Params w = random.params(row());
         const text32::Bounds b = text32::shape_bounds(kind(), w.data());
         const Around around(b);
@@ -320,7 +320,7 @@ TEST_P(EachShape, EveryInstructionSetGivesTheSameBytes) {
     grid.columns = grid.rows = kGridSide;
     grid.values.assign(std::begin(kGrid), std::end(kGrid));
     const MeshGrid mesh = ball_grid();
-    for_all(name() + ": same bytes", [&](Random& random) {
+    for_all(name() + ": same bytes", [&](RandomValues& random) {
         Edit edit;
         edit.name = "shape";
         edit.node.shape.kind = uint16_t(kind());
@@ -361,7 +361,7 @@ TEST_P(EachShape, EveryInstructionSetGivesTheSameBytes) {
 // Thin and needle-like ellipsoids are where the iteration has the farthest to go.
 TEST(Ellipsoid, IsOneLipschitzAndConvergedForAnyProportions) {
     const uint32_t kind = *shape_kind("ellipsoid");
-    for_all("ellipsoid of any proportions", [&](Random& random) {
+    for_all("ellipsoid of any proportions", [&](RandomValues& random) {
         Params w{};
         for (size_t i = 0; i < 3; ++i) w[i] = float(std::pow(10.0, random.in(-3, 1)));
         const double size = double(std::max({w[0], w[1], w[2]}));

@@ -80,9 +80,9 @@ inline const float* samples_of(uint32_t kind) {
     return shape_rows()[kind].name == "mesh" ? ball.data() : kGrid;
 }
 
-class Random {
+class RandomValues {
 public:
-    explicit Random(uint64_t seed) : engine_(seed) {}
+    explicit RandomValues(uint64_t seed) : engine_(seed) {}
     double in(double lo, double hi) { return std::uniform_real_distribution<double>(lo, hi)(engine_); }
     int below(int n) { return std::uniform_int_distribution<int>(0, n - 1)(engine_); }
     bool one_in(int n) { return below(n) == 0; }
@@ -137,11 +137,11 @@ private:
     std::mt19937_64 engine_;
 };
 
-/// Runs `property(Random&)` for many seeds; a failing property calls RC_FAIL or RC_ASSERT, and RapidCheck names the seed.
+/// Runs `property(RandomValues&)` for many seeds; a failing property calls RC_FAIL or RC_ASSERT, and RapidCheck names the seed.
 template <typename Property>
 void for_all(const std::string& what, Property property) {
     EXPECT_TRUE(rc::check(what, [&] {
-        Random random(*rc::gen::noShrink(rc::gen::arbitrary<uint64_t>()));
+        RandomValues random(*rc::gen::noShrink(rc::gen::arbitrary<uint64_t>()));
         property(random);
     }));
 }
@@ -183,7 +183,7 @@ struct Around {
         }
     }
     /// Floats, so that both precisions see the same point. Often near, sometimes far, sometimes on an axis or a plane of symmetry.
-    Point point(Random& random) const {
+    Point point(RandomValues& random) const {
         const double out = random.one_in(4) ? size * random.in(1, 20) : 0.3 * size;
         Point p;
         for (size_t i = 0; i < 3; ++i)
@@ -195,7 +195,7 @@ struct Around {
 inline double magnitude(const Point& p) { return std::max({std::fabs(p[0]), std::fabs(p[1]), std::fabs(p[2])}); }
 inline double between(const Point& p, const Point& q) { return std::hypot(p[0] - q[0], p[1] - q[1], p[2] - q[2]); }
 /// A float point at a distance from p of about `reach`.
-inline Point beside(Random& random, const Point& p, double reach) {
+inline Point beside(RandomValues& random, const Point& p, double reach) {
     Point q;
     for (size_t i = 0; i < 3; ++i) q[i] = double(float(p[i] + random.in(-reach, reach)));
     return q;
