@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "scene/json_source.h"
+#include "rounds.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -86,7 +87,7 @@ TEST(JsonDocument, UnderflowIsZeroAndOverflowOfFloatIsInfinity) {
 }
 
 TEST(JsonDocument, DepthNeedsNoStack) {
-    constexpr size_t kDeep = 1000000;
+    constexpr size_t kDeep = rounds(1000000);
     std::string text(kDeep, '[');
     text.append(kDeep, ']');
     auto d = JsonDocument::parse(text, "f");
