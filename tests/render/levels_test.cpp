@@ -3,6 +3,7 @@
 
 #include "gpu_worlds.h"
 
+#include "field/brick_set.h"
 #include "field/clipmap.h"
 #include "image/metrics.h"
 #include "render/lib/pack.h"
@@ -16,6 +17,7 @@
 namespace kiln::render {
 namespace {
 
+using field::BrickSet;
 using field::Clipmap;
 using field::worlds::Random;
 
@@ -290,25 +292,42 @@ TEST(LevelPicturesGpu, NothingPopsOnADolly) {
     EXPECT_LE(worst, 0.02f) << "of any pixel";
 }
 
-// Two renderers, two clipmaps, the same flight: the same bits, whatever is still missing.
-TEST(LevelPicturesGpu, TwoRunsOfAFlightAreTheSameBits) {
-    const auto program = field::worlds::compiled(hills());
+// Gate G25 of a world that changes: two renderers, two clipmaps, the same flight among things that move and edits that come: the same bits, whatever
+// is still missing.
+TEST(LevelPicturesGpu, TwoRunsOfAFlightThroughAWorldThatChangesAreTheSameBits) {
+    const float h = 0.02f;
+    const auto stone = BrickSet::make(field::worlds::compiled({field::worlds::edit(Sphere{.radius = 0.15f})}), h);
+    ASSERT_TRUE(stone);
     std::vector<std::vector<uint8_t>> first;
     for (const int run : {0, 1}) {
         auto renderer = renderer_or_skip();
         if (!renderer) GTEST_SKIP();
-        Clipmap map = made(program, {0, 0.9, 3}, 0.02f, 4);
+        std::vector<Edit> edits = hills();
+        field::worlds::Live live(edits);
+        Clipmap map = made(live.program(), {0, 0.9, 3}, h, 4);
         map.work({.bricks = 2000});
+        Pose before[3];
         for (int frame = 0; frame < 5; ++frame) {
             const vec3 eye{0.3f * float(frame), 0.9f, 3 - 0.4f * float(frame)};
             map.move({double(eye.x), double(eye.y), double(eye.z)});
+            edits.push_back(field::worlds::edit(Sphere{.radius = 0.2f}, {0.3f * float(frame) - 0.4f, -0.1f, 0.8f},
+                                                frame % 2 == 0 ? Op::Union : Op::Subtract));
+            map.edit(live.program(), live.become(edits));
             map.work({.bricks = 400});
-            auto picture = renderer->render(seen_from(map, eye, {0.4f, 0.2f, -1}), {.width = 64, .height = 36});
+            Frame seen = seen_from(map, eye, {0.4f, 0.2f, -1});
+            for (int i = 0; i < 3; ++i) {
+                const Pose pose{{0.4f * float(i) - 0.3f + 0.05f * float(frame), 0.5f, 0.6f}};
+                seen.instances.push_back({.bricks = *stone, .pose = pose, .before = frame == 0 ? pose : before[i]});
+                before[i] = pose;
+            }
+            auto picture = renderer->render(seen, {.width = 64, .height = 36});
             ASSERT_TRUE(picture) << picture.error().message;
-            if (run == 0)
+            if (run == 0) {
+                EXPECT_TRUE(first.empty() || picture->srgb != first.back()) << "nothing changed in frame " << frame;
                 first.push_back(picture->srgb);
-            else
+            } else {
                 EXPECT_EQ(picture->srgb, first[size_t(frame)]) << "frame " << frame;
+            }
         }
     }
 }
