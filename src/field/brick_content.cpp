@@ -14,12 +14,12 @@ constexpr size_t kPalette = size_t(kPaletteSize);
 class PaletteBuilder {
 public:
     void add(uint16_t id, uint32_t weight) {
-        for (Entry& entry : entries_) {
-            if (entry.id != id) continue;
-            entry.weight += weight;
-            return;
+        if (last_ >= entries_.size() || entries_[last_].id != id) {
+            last_ = size_t(std::find_if(entries_.begin(), entries_.end(), [&](const Entry& e) { return e.id == id; }) -
+                           entries_.begin());
+            if (last_ == entries_.size()) entries_.push_back({id, 0});
         }
-        entries_.push_back({id, weight});
+        entries_[last_].weight += weight;
     }
 
     // The 16 heaviest, ties to the lower number, in ascending order; the number left out.
@@ -52,6 +52,7 @@ private:
         uint32_t weight;
     };
     std::vector<Entry> entries_;
+    size_t last_ = 0;  // that was added to: neighbours are mostly of the same material
     int heaviest_slot_ = 0;
 };
 
@@ -138,21 +139,26 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
     return out;
 }
 
-// Of the texels at hand; where the code is cut up, of the octants that are wanted.
-void BrickEvaluator::mixes(std::array<bool, sdf::OctantCodes::kOctants> wanted, sdf::MaterialMix* out) const {
+// Of those texels, each at its place in `out`; others' places may be written too.
+void BrickEvaluator::mixes(std::span<const uint16_t> texels, sdf::MaterialMix* out) const {
     constexpr int kTexels = sdf::OctantCodes::kTexels;
-    float points[3][kBrickTexelCount], values[kBrickTexelCount];
+    alignas(64) float points[3][kBrickTexelCount], values[kBrickTexelCount];
     const auto place_point = [&](int at, int texel) {
         points[0][at] = x_[texel & 7];
         points[1][at] = y_[texel >> 3 & 7];
         points[2][at] = z_[texel >> 6];
     };
     if (!cut_) {
-        for (int i = 0; i < kBrickTexelCount; ++i) place_point(i, i);
-        sdf::evaluate_materials(sdf::view(*program_, code_), {points[0], points[1], points[2], kBrickTexelCount},
-                                values, out);
+        const int count = int(texels.size());
+        for (int i = 0; i < count; ++i) place_point(i, texels[size_t(i)]);
+        thread_local std::array<sdf::MaterialMix, kBrickTexelCount> mixes;
+        sdf::evaluate_materials(sdf::view(*program_, code_), {points[0], points[1], points[2], count}, values,
+                                mixes.data());
+        for (size_t i = 0; i < texels.size(); ++i) out[texels[i]] = mixes[i];
         return;
     }
+    std::array<bool, sdf::OctantCodes::kOctants> wanted{};
+    for (const size_t i : texels) wanted[(i >> 2 & 1) | (i >> 5 & 1) << 1 | (i >> 8 & 1) << 2] = true;
     for (int octant = 0; octant < sdf::OctantCodes::kOctants; ++octant) {
         if (!wanted[size_t(octant)]) continue;
         const std::span<const sdf::Instruction> code = octants_.material_code(octant);
@@ -170,35 +176,43 @@ void BrickEvaluator::mixes(std::array<bool, sdf::OctantCodes::kOctants> wanted, 
 
 BrickMaterials BrickEvaluator::materials() const {
     constexpr size_t kTexels = size_t(kBrickTexelCount);
-    const auto in_band = [&](size_t i) { return std::fabs(distances_[i] * voxels_per_metre_) < kBandVoxels; };
-    std::array<bool, sdf::OctantCodes::kOctants> wanted{};
+    std::array<uint16_t, kTexels> in_band;
+    size_t count = 0;
     for (size_t i = 0; i < kTexels; ++i) {
-        if (in_band(i)) wanted[(i >> 2 & 1) | (i >> 5 & 1) << 1 | (i >> 8 & 1) << 2] = true;
+        in_band[count] = uint16_t(i);
+        count += std::fabs(distances_[i] * voxels_per_metre_) < kBandVoxels ? 1 : 0;
     }
-    thread_local std::vector<sdf::MaterialMix> mixes(kTexels);
-    this->mixes(wanted, mixes.data());
+    const std::span band(in_band.data(), count);
+    thread_local std::array<sdf::MaterialMix, kTexels> mixes;
+    this->mixes(band, mixes.data());
 
     BrickMaterials out;
     thread_local PaletteBuilder palette;
     palette.clear();
-    for (size_t i = 0; i < kTexels; ++i) {
-        if (!in_band(i)) continue;
-        const uint32_t second = material_word(0, 0, mixes[i].weight) >> 8;
+    for (const size_t i : band) {
+        const uint32_t second = mixes[i].weight > 0 ? material_word(0, 0, mixes[i].weight) >> 8 : 0;
         palette.add(known(mixes[i].id0), 510 - second);
         if (second != 0) palette.add(known(mixes[i].id1), second);
     }
     out.dropped = palette.finish(out.palette);
-    for (size_t i = 0; i < kTexels; ++i) {
-        out.words[i] = 0;
-        if (!in_band(i)) continue;
+    out.words.fill(0);
+    const auto alone = [](int slot) { return uint16_t(material_word(uint32_t(slot), uint32_t(slot), 0.0f)); };
+    const sdf::MaterialMix* before = nullptr;  // neighbours are mostly of the same material
+    for (const size_t i : band) {
         const sdf::MaterialMix& mix = mixes[i];
+        if (before != nullptr && !(mix.weight > 0) && !(before->weight > 0) && mix.id0 == before->id0) {
+            out.words[i] = out.words[size_t(before - mixes.data())];
+            continue;
+        }
+        before = &mix;
         int slot0 = palette.slot_of(known(mix.id0));
         int slot1 = mix.weight > 0 ? palette.slot_of(known(mix.id1)) : slot0;
         const bool both = slot0 >= 0 && slot1 >= 0;
         if (slot0 < 0) slot0 = slot1 >= 0 ? slot1 : palette.heaviest_slot();
-        if (!both) slot1 = slot0;
-        out.words[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot1), both ? mix.weight : 0.0f));
-        if (out.words[i] >> 8 == 0) out.words[i] = uint16_t(material_word(uint32_t(slot0), uint32_t(slot0), 0.0f));
+        out.words[i] = alone(slot0);
+        if (!both || !(mix.weight > 0)) continue;
+        const uint32_t word = material_word(uint32_t(slot0), uint32_t(slot1), mix.weight);
+        if (word >> 8 != 0) out.words[i] = uint16_t(word);
     }
     return out;
 }

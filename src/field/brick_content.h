@@ -96,7 +96,7 @@ public:
 private:
     void place(ivec3 first);
     BrickMaterials materials() const;
-    void mixes(std::array<bool, sdf::OctantCodes::kOctants> wanted, sdf::MaterialMix* out) const;
+    void mixes(std::span<const uint16_t> texels, sdf::MaterialMix* out) const;
 
     const sdf::Program* program_;
     float voxel_size_, voxels_per_metre_;

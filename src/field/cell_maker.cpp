@@ -20,11 +20,10 @@ vec3 origin_of_block(ivec3 block, float voxel_size) {
     return {axis(block.x), axis(block.y), axis(block.z)};
 }
 
-// How much farther than `far` an edit matters, since later ones that blend lead its values on: see edit_index.cpp. What is gone has no
-// place in the list: every other may be later.
-static float later_reaches(const sdf::Program& program, const sdf::IndexedEdit& edit, float far, bool gone) {
+// How much farther than `far` an edit matters, since later ones that blend lead its values on: see edit_index.cpp.
+static float later_reaches(const sdf::Program& program, const sdf::IndexedEdit& edit, float far, bool anywhere) {
     const float most = program.index.blend_allowance(edit.influence(far), far, edit.row);
-    if (most == 0 || gone) return most;
+    if (most == 0 || anywhere) return most;
     std::vector<uint32_t> rows;
     program.index.find_blending(edit.influence(far + most), far + most, rows);
     sdf::BlendAllowance out;
@@ -34,7 +33,7 @@ static float later_reaches(const sdf::Program& program, const sdf::IndexedEdit& 
     return out.metres();
 }
 
-CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool gone) {
+CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool anywhere) {
     const sdf::EditSpan& span = program.edits[row];
     if (span.count == 0) return {};
     if (span.everywhere()) {
@@ -54,7 +53,7 @@ CellsReached cells_reached(const sdf::Program& program, uint32_t row, const Cell
     };
     const float far = influence_reach(lattice.voxel_size);
     const sdf::IndexedEdit edit = span.indexed(row);
-    const float more = later_reaches(program, edit, far, gone);
+    const float more = later_reaches(program, edit, far, anywhere);
     const float own = (lattice.own_voxels + 0.01f) * lattice.voxel_size;
     return {cells(edit.influence(far + more)), cells(edit.influence(own + more))};
 }

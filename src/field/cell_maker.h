@@ -45,12 +45,14 @@ inline bool meet(const CellBox& a, const CellBox& b) {
 }
 inline ivec3 all_of(int a) { return {a, a, a}; }
 
-/// World cells that an edit can change, one of the program or one that is `gone` from it; far beyond any world where it is everywhere.
+/// World cells that an edit can change by coming into the program or by leaving it; far beyond any world where it is everywhere.
 struct CellsReached {
     CellBox stored;  ///< what their bricks hold. Empty: none
     CellBox owned;   ///< whether they own bricks: elsewhere, what is empty stays so
 };
-CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool gone);
+/// Of several that leave and come, think that the last in order leave first and then the first come first: so at each step what is later is
+/// in the program. `anywhere`: the edit has left, and the list has new numbers since; every other may be later.
+CellsReached cells_reached(const sdf::Program& program, uint32_t row, const CellLattice& lattice, bool anywhere);
 
 /// Whether a brick's code stays what it was when `rows`, in ascending order, go, and it would begin so.
 bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, std::span<const uint32_t> rows,

@@ -271,9 +271,12 @@ void Clipmap::add_parts(Batch& batch, const CellBox& clip) const {
 
 // The batch is what its level is to show next.
 void Clipmap::begin(Batch& batch, int level) const {
+    const std::shared_ptr<const sdf::Program>& shown = levels_[size_t(level)].program;
+    const bool renumbered = shown == nullptr || shown->numbering != batch.program->numbering;
     for (const std::vector<uint32_t>* rows : {&batch.removed, &batch.inserted}) {
         for (const uint32_t row : *rows) {
-            const CellBox box = cells_reached(*batch.program, row, lattice(level, {}), rows == &batch.removed).stored;
+            const bool anywhere = renumbered && rows == &batch.removed;
+            const CellBox box = cells_reached(*batch.program, row, lattice(level, {}), anywhere).stored;
             if (!box.empty()) batch.boxes.push_back(box);
         }
     }

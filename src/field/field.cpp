@@ -264,12 +264,13 @@ private:
         const auto on_grid = [&](const CellBox& world) {
             return grown({world.min - first_cell(), world.max - first_cell()}, 0, size_);
         };
+        const bool renumbered = old_->program().numbering != program_->numbering;
         const auto add = [&](uint32_t row, bool gone) {
-            const CellsReached world = cells_reached(*program_, row, lattice(), gone);
+            const CellsReached world = cells_reached(*program_, row, lattice(), gone && renumbered);
             const CellBox box = on_grid(world.stored), owned = on_grid(world.owned);
             if (!box.empty()) {
                 dirty_.push_back(box);
-                reached_.push_back({row, gone, box});
+                reached_.push_back({row, gone, gone && renumbered, box});
             }
             if (!owned.empty()) owned_.push_back(owned);
             return box;

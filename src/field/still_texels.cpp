@@ -62,9 +62,8 @@ void StillTexels::see(std::span<const uint32_t> rows) {
     for (const Change& change : changes_) {
         const sdf::EditSpan& edit = program_->edits[change.row];
         sdf::BlendAllowance later;
-        // What is gone has no place in the list, which may have new numbers since: it may be before any other, and after.
         for (const uint32_t row : rows) {
-            if (change.gone || program_->edits[row].order > edit.order) later.add(program_->edits[row].reach);
+            if (change.anywhere || program_->edits[row].order > edit.order) later.add(program_->edits[row].reach);
         }
         for (const Change& other : changes_) {
             if (other.gone && other.row != change.row) later.add(program_->edits[other.row].reach);

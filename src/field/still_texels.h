@@ -25,6 +25,7 @@ public:
     struct Change {
         uint32_t row;
         bool gone;
+        bool anywhere;    ///< see cells_reached()
         CellBox reached;  ///< cells in which it may change what is stored
     };
     StillTexels(const sdf::Program& program, const CellLattice& lattice, std::vector<Change> changes);

@@ -17,7 +17,7 @@ namespace {
 
 const std::vector<BenchFamily>& families() {
     static const std::vector<BenchFamily> all{field_family(),   edits_family(),   expression_family(), world_family(),
-                                              physics_family(), journal_family(), frame_family()};
+                                              physics_family(), journal_family(), frame_family(),      gpu_family()};
     return all;
 }
 

@@ -61,6 +61,7 @@ BenchFamily edits_family();
 BenchFamily expression_family();
 BenchFamily field_family();
 BenchFamily frame_family();
+BenchFamily gpu_family();
 BenchFamily journal_family();
 BenchFamily physics_family();
 BenchFamily world_family();

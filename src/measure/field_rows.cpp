@@ -292,6 +292,12 @@ private:
         return sum / double(values.size());
     }
 
+    // Peers can neither undo nor move: every row is held against the cut that they can do, so that it can be judged on any machine.
+    static void beside_cut(BenchRow& out, const Turns& turns) {
+        const double cut = mean(turns.peer);
+        if (cut < 1e300) compare(out, std::string(peers()->tree_name) + "'s cut", cut * 1e6);
+    }
+
     void edit_rows(int threads) {
         const bool undo = wanted("undo");
         if (wanted("edit.mean") || wanted("edit.worst") || undo) {
@@ -319,6 +325,7 @@ private:
                                  turns.checksum, slow_way);
             if (undo) {
                 BenchRow out = row("undo", mean(turns.backwards) * 1e6, "µs", threads);
+                beside_cut(out, turns);
                 out.roof_ratio = turns.roots / roofs().roots / mean(turns.backwards);
                 baked(out, turns.bricks);
                 run_.add_checked(out, turns.undone, stored(start()).checksum);
@@ -367,8 +374,9 @@ private:
             if (!wanted(way.name)) continue;
             run_.stage(way.name);
             const std::vector<Step> steps = history(way.change);
-            const Turns turns = take_turns(steps, false, false, threads);
+            const Turns turns = take_turns(steps, true, false, threads);
             BenchRow out = row(way.name, mean(turns.forwards) * 1e6, "µs", threads);
+            beside_cut(out, turns);
             out.roof_ratio = turns.roots / roofs().roots / mean(turns.forwards);
             baked(out, turns.bricks);
             run_.add_checked(out, turns.checksum, rebuilt(after(steps)));

@@ -107,12 +107,13 @@ private:
         state.bricks = std::move(*bricks);
         std::array<double, kPlaces> least;
         least.fill(1e300);
-        uint64_t found = 0, slow_way = 0;
+        uint64_t found = 0, slow_way = 0, baked = 0;
         for (int turn = 0; turn < run_.options.runs; ++turn) {
             std::optional<State> picture;
             for (uint32_t m = 0; m < kPlaces; ++m) {
                 picture = state;
                 least[m] = std::min(least[m], seconds_of([&] { apply(state, change(m), m); }));
+                if (turn == 0) baked += state.bricks.field().jobs().size();
             }
             if (turn == 0) {
                 found = stored(state.bricks).checksum;
@@ -130,6 +131,8 @@ private:
         out.threads = 1;
         out.count = program_->index.size();
         out.scene = scene_;
+        out.bricks = double(baked) / kPlaces;
+        out.texels = baked * field::kBrickTexelCount / kPlaces;
         run_.add_checked(out, found, slow_way);
     }
 

@@ -581,6 +581,7 @@ void Program::number_anew(std::span<const uint32_t> rows) {
     for (size_t i = 0; i < rows.size(); ++i) next[rows[i]].order = order_at(i);
     edits = {};
     edits.append(next);
+    ++numbering;
     settle();
 }
 

@@ -40,6 +40,12 @@ namespace kiln::sdf {
 // Shapes whose leaves run over a whole brick in one loop.
 inline constexpr uint32_t kFusedSphere = uint32_t(ShapeKind::Sphere);
 inline constexpr uint32_t kFusedBox = uint32_t(ShapeKind::Box);
+/// Are these the words of such a leaf: [point] [shape], moved and nothing more? Each file's own, since they are made for other processors.
+[[maybe_unused]] static constexpr bool is_fused_leaf(uint32_t point, uint32_t shape) {
+    const uint32_t move = point & 31u, kind = (shape >> 5) & 255u;
+    return (move == uint32_t(Opcode::PointTranslate) || move == uint32_t(Opcode::PointCell)) &&
+           (shape & 31u) == uint32_t(Opcode::Shape) && (kind == kFusedSphere || kind == kFusedBox);
+}
 /// Custom instructions' way out of the lanes (custom.h).
 void custom_points(uint32_t index, const float* params, const double* x, const double* y, const double* z, int count,
                    double* out);

@@ -141,11 +141,12 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
 }
 
 #ifdef KILN_FEW
-// A ball or a box at C - t, where `code` is one.
-static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const float* params, const float* t) {
-    const uint32_t word = code[0], shape = (word >> 5) & 255u;
-    if (Opcode(word & 31u) != Opcode::Shape || (shape != kFusedSphere && shape != kFusedBox)) return false;
-    const float* w = params + code[1];
+// Both instructions of a leaf that is_fused_leaf(), where `code` begins with PointTranslate and is one.
+static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const float* params) {
+    const uint32_t word = code[2], shape = (word >> 5) & 255u;
+    if (!is_fused_leaf(code[0], word)) return false;
+    const float* t = params + code[1];
+    const float* w = params + code[3];
     Chunk& dst = r.value[(word >> 13) & 31u];
     for (int i = 0; i < KILN_VECTORS; ++i) {
         const real3 p = point_at(r.cell, i) - param3_at(t);
@@ -167,7 +168,7 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
         const Chunk& b = r.value[(word >> 23) & 31u];
         const uint32_t aux = (word >> 5) & 255u;
 #ifdef KILN_FEW  // points too few to hide the cost of decoding: most edits begin like this
-        if (Opcode(word & 31u) == Opcode::PointTranslate && pc + 1 < count && moved_ball_or_box(r, code + 2 * (pc + 1), params, w)) {
+        if (Opcode(word & 31u) == Opcode::PointTranslate && pc + 1 < count && moved_ball_or_box(r, code + 2 * pc, params)) {
             ++pc;
             continue;
         }

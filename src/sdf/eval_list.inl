@@ -140,19 +140,18 @@ static BrickLeaf leaf_of(int join) {
     }
 }
 
+// What a fused leaf's points are moved by.
+static inline const float* leaf_origin(const uint32_t* code, const float* params) {
+    static const float kOrigin[3] = {0, 0, 0};
+    return Opcode(code[0] & 31u) == Opcode::PointTranslate ? params + code[1] : kOrigin;
+}
+
 // The leaf of [point] [shape] [combine, move, negate or take] at `code`, when it is one of those that run over the whole brick.
 static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* params, const float*& t, float& k) {
-    static const float kOrigin[3] = {0, 0, 0};
     if (left < 3) return nullptr;
-    const Opcode point = Opcode(code[0] & 31u), shape = Opcode(code[2] & 31u), join = Opcode(code[4] & 31u);
-    if (shape != Opcode::Shape || ((code[2] >> 13) & 31u) != 1u) return nullptr;
-    if (point == Opcode::PointTranslate) {
-        t = params + code[1];
-    } else if (point == Opcode::PointCell) {
-        t = kOrigin;
-    } else {
-        return nullptr;
-    }
+    const Opcode join = Opcode(code[4] & 31u);
+    if (!is_fused_leaf(code[0], code[2]) || ((code[2] >> 13) & 31u) != 1u) return nullptr;
+    t = leaf_origin(code, params);
     const uint32_t dst = (code[4] >> 13) & 31u, a = (code[4] >> 18) & 31u, b = (code[4] >> 23) & 31u, aux = (code[4] >> 5) & 255u;
     int how = -1;
     k = 0;
@@ -344,17 +343,11 @@ static __attribute__((noinline)) bool leaf_keeps_away(const BrickPoints& points,
 // See sdf/eval.h.
 bool keeps_away(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x, const float* y,
                 const float* z, const Away& from, void* memory) {
-    static const float kOrigin[3] = {0, 0, 0};
     BrickPoints points;
     place_brick(points, x, y, z);
-    const Opcode point = Opcode(code[0] & 31u);
-    if (count == 2 && (point == Opcode::PointTranslate || point == Opcode::PointCell) && Opcode(code[2] & 31u) == Opcode::Shape) {
-        const float* const t = point == Opcode::PointTranslate ? params + code[1] : kOrigin;
-        switch ((code[2] >> 5) & 255u) {
-            case kFusedSphere: return leaf_keeps_away<kFusedSphere>(points, t, params + code[3], from);
-            case kFusedBox: return leaf_keeps_away<kFusedBox>(points, t, params + code[3], from);
-            default: break;
-        }
+    if (count == 2 && is_fused_leaf(code[0], code[2])) {
+        const auto leaf = ((code[2] >> 5) & 255u) == kFusedSphere ? &leaf_keeps_away<kFusedSphere> : &leaf_keeps_away<kFusedBox>;
+        return leaf(points, leaf_origin(code, params), params + code[3], from);
     }
     Registers r;
     r.memory = static_cast<Chunk*>(memory);

@@ -30,12 +30,6 @@ bool is_join(Instruction in) {
     }
 }
 
-bool is_moved_ball_or_box(std::span<const Instruction> content) {
-    return content.size() == 2 &&
-           (content[0].opcode() == Opcode::PointTranslate || content[0].opcode() == Opcode::PointCell) &&
-           content[1].opcode() == Opcode::Shape && (content[1].aux() == kFusedSphere || content[1].aux() == kFusedBox);
-}
-
 }  // namespace
 
 // Finds the segments; false where the code is short, or no list.
@@ -48,7 +42,8 @@ bool OctantCodes::divide(std::span<const Instruction> code) {
         while (end < code.size() && (code[end].moves_point() || code[end].dst() != 0)) ++end;
         if (end == code.size() || !is_join(code[end])) return false;
         segments_.push_back({at, end - at});
-        if (!is_moved_ball_or_box(code.subspan(at, end - at))) alone += int(end - at) + 1;
+        const bool fused = end - at == 2 && is_fused_leaf(code[at].word, code[at + 1].word);
+        if (!fused) alone += int(end - at) + 1;
         at = end + 1;
     }
     return alone >= kWorthCutting;

@@ -135,7 +135,9 @@ public:
     std::vector<uint32_t> meshes;  ///< blocks of samples where each begins
     Box3 bounds;  ///< what the finite edits can change: solids of unions, and of the others where something is
                   ///< unbounded; empty when none
-    bool unbounded = false;     ///< some visible union edit has infinite bounds
+    bool unbounded = false;  ///< some visible union edit has infinite bounds
+    uint32_t numbering =
+        0;  ///< times that the list had new orders: of rows removed before the last, `order` says nothing any more
     uint32_t memory_slots = 0;  ///< values that formulas keep outside the registers at once; the GPU has none
 
     /// Rows of the visible edits, in order.

@@ -133,6 +133,28 @@ TEST(HostBricks, ASphereIsOffByAQuarterOverItsRadius) {
     }
 }
 
+// docs/architecture.md, Measuring: a cell of 7 voxels is met, to a voxel beyond, by (7 |n|_1 + 2) / 343 of a surface's area.
+TEST(HostBricks, ASurfaceHasAsManyBricksAsItsDirectionAsksFor) {
+    double plane = 0;
+    constexpr int kHeights = 28;
+    for (int i = 0; i < kHeights; ++i) {
+        worlds::World world{"plane",
+                            {worlds::edit(Plane{}, {0, 0.00125f + 0.0025f * float(i), 0})},
+                            {.voxel_size = 0.01f, .bounds = {{-0.69f, -0.3f, -0.69f}, {0.69f, 0.3f, 0.69f}}}};
+        plane += double(world.field()->slots().size()) / kHeights;
+    }
+    EXPECT_NEAR(plane / (140 * 140), (7 * 1 + 2) / 343.0, 0.02 * 9 / 343.0) << "|n|_1 is 1";
+    double ball = 0;
+    worlds::Random r(3);
+    constexpr double kRadius = 60;
+    constexpr int kBalls = 4;
+    for (int i = 0; i < kBalls; ++i)
+        ball += double(worlds::sphere_of(float(kRadius), r.point(1)).field()->slots().size()) / kBalls;
+    constexpr double kPi = 3.141592653589793;
+    EXPECT_NEAR(ball / (4 * kPi * kRadius * kRadius), (7 * 1.5 + 2) / 343, 0.02 * 12.5 / 343)
+        << "|n|_1 is 1.5 on average";
+}
+
 TEST_P(EachFormat, NeighboursAgreeOnSharedTexelsBitForBit) {
     for (worlds::World world : worlds::all()) {
         world.options.format = GetParam();

@@ -255,6 +255,21 @@ TEST(BenchFrameGpu, EveryPassOfEverySizeIsARowAndPicturesAreTheSame) {
     }
 }
 
+TEST(BenchGpu, TheDevicesBakeIsBesideTheCpusAndHasItsTexels) {
+    const std::vector<std::string> rows{"gpu/bake"};
+    const auto report = run_bench(rows, small({0, 2}));
+    ASSERT_TRUE(report) << report.error().message;
+    if (report->rows.empty()) GTEST_SKIP() << "no Vulkan device";
+    ASSERT_EQ(report->rows.size(), 2u);
+    for (const BenchRow& row : report->rows) {
+        EXPECT_THAT(row.name, testing::MatchesRegex("gpu.bake/.+")) << "the device's name";
+        EXPECT_GT(row.value, 0);
+        EXPECT_GT(row.peer_value, 0);
+        EXPECT_GT(row.texels, 0u);
+        EXPECT_EQ(row.checksum.size(), 16u);
+    }
+}
+
 TEST(Bench, WrongWordsAreToldWithTheMend) {
     const std::vector<std::string> unknown{"feild"};
     const auto report = run_bench(unknown, small({0}));
