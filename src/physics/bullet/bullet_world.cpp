@@ -2,17 +2,16 @@
 
 #include "physics/bullet/bullet_world.h"
 
+#include "physics/bullet/contact_solver.h"
 #include "physics/bullet/region_edges.h"
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/sdf_collision.h"
 
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
-#include <BulletDynamics/ConstraintSolver/btNNCGConstraintSolver.h>
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 namespace kiln::physics {
 
@@ -102,78 +101,6 @@ struct BulletMesh {
     btTriangleInfoMap edges;
 };
 
-// Sequential impulses with conjugate gradients (Silcowitz-Hansen, Niebe and Erleben, 2010). What an iteration finds out at one contact it
-// tells the next ones of the same bodies, so how many are needed is a matter of how many bodies lie between one and the ground: a stack of
-// ten sways more and more with fewer than four a storey, a heap as wide as you like that is two high needs no more than one body.
-class Solver final : public btNNCGConstraintSolver {
-public:
-    btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
-                        int manifold_count, btTypedConstraint** constraints, int constraint_count,
-                        const btContactSolverInfo& settings, btIDebugDraw* draw, btDispatcher* dispatcher) override {
-        btContactSolverInfo info = settings;
-        int moving = 0;
-        bool fast = false;
-        for (int i = 0; i < body_count; ++i) {
-            if (bodies[i]->isStaticOrKinematicObject()) continue;
-            ++moving;
-            fast = fast || bodies[i]->getInterpolationLinearVelocity().length2() > kFast * kFast;
-        }
-        const int high = moving < 3 ? moving : storeys({manifolds, size_t(manifold_count)}, moving);
-        info.m_numIterations = std::clamp(kStorey * high, kFew, kMany);
-        // An island ends its iterations when the last one changed the velocities of its bodies by less than 0.3 mm/s (root of the mean
-        // square).
-        info.m_leastSquaresResidualThreshold = kEnough * float(std::max(moving, 1));
-        // What glides or rolls in a bowl is a little too deep after each step: it is moved out, since a velocity given for that would stay.
-        // What rests is pushed out: moved, it would lose touch again and again.
-        if (moving == 1 && fast) info.m_splitImpulsePenetrationThreshold = 0;
-        return btNNCGConstraintSolver::solveGroup(bodies, body_count, manifolds, manifold_count, constraints,
-                                                  constraint_count, info, draw, dispatcher);
-    }
-
-    btVector3 gravity{0, 0, 0};
-
-private:
-    static constexpr int kStorey = 4, kFew = 12, kMany = 40;
-    static constexpr float kFast = 1;  // m/s
-    static constexpr float kEnough = 1e-7f;
-
-    // The most bodies between one and the ground, itself counted, by the shortest way down that carries it, as far as it matters. A wall
-    // carries nobody; what nothing carries falls, and bears nothing.
-    int storeys(std::span<btPersistentManifold* const> manifolds, int moving) {
-        constexpr int kTop = kMany / kStorey;
-        constexpr float kCarries = 0.3f;  // sine of the least slope of a push that holds somebody up
-        const float pull = gravity.length();
-        if (!(pull > 0)) return kTop;
-        const auto height = [&](const btCollisionObject* o) -> int& {
-            const size_t i = size_t(o->getUserIndex());
-            if (i >= height_.size()) height_.resize(i + 1, kTop);
-            return height_[i];
-        };
-        constexpr int kFalls = 1 << 20;
-        for (const btPersistentManifold* m : manifolds)
-            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
-                height(o) = o->isStaticOrKinematicObject() ? 0 : kFalls;
-        bool lower = true;
-        while (lower) {
-            lower = false;
-            for (const btPersistentManifold* m : manifolds) {
-                int &a = height(m->getBody0()), &b = height(m->getBody1());
-                for (int i = 0; i < m->getNumContacts(); ++i) {
-                    const float up = -m->getContactPoint(i).m_normalWorldOnB.dot(gravity) / pull;  // of body 0
-                    if (up > kCarries && a > b + 1) a = b + 1, lower = true;
-                    if (up < -kCarries && b > a + 1) b = a + 1, lower = true;
-                }
-            }
-        }
-        int out = 1;
-        for (const btPersistentManifold* m : manifolds)
-            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
-                if (height(o) < kFalls) out = std::max(out, height(o));
-        return std::min({out, moving, kTop});
-    }
-    std::vector<int> height_;  // by the body's index
-};
-
 class BulletWorld;
 
 // Bullet's world, which asks ours before it moves the bodies.
@@ -198,8 +125,6 @@ public:
         solver_.gravity = dynamics_.getGravity();
         dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
         btContactSolverInfo& solver = dynamics_.getSolverInfo();
-        // One direction of friction lets stacks creep sideways; with two, the plain solver makes a stack of ten boxes sway more and more.
-        solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
         dynamics_.setForceUpdateAllAabbs(false);
         solver.m_restitutionVelocityThreshold = 0.5f;
         solver.m_minimumSolverBatchSize = 1;  // islands by themselves
@@ -279,8 +204,6 @@ protected:
         object->body->setLinearVelocity(to_bullet(b.settings.linear_velocity));
         object->body->setAngularVelocity(to_bullet(b.settings.angular_velocity));
         dynamics_.addRigidBody(object->body.get());
-        // Gyroscopic torque as Euler's equations have it, integrated implicitly so that thin bodies stay stable.
-        object->body->setFlags(object->body->getFlags() | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
         object->anchor = to_pose(at);
         set_sleep(*object, false);
         objects_[index] = std::move(object);
@@ -458,7 +381,7 @@ private:
     mutable btCollisionDispatcher dispatcher_{&configuration_};
     SdfAlgorithms algorithms_{dispatcher_};
     mutable btDbvtBroadphase broadphase_;
-    Solver solver_;
+    ContactSolver solver_;
     Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &solver_, &configuration_};
     std::vector<std::unique_ptr<Object>> objects_;
 };
