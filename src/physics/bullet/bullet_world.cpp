@@ -3,6 +3,7 @@
 #include "physics/bullet/bullet_world.h"
 
 #include "physics/bullet/contact_solver.h"
+#include "physics/bullet/islands.h"
 #include "physics/bullet/region_edges.h"
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/sdf_collision.h"
@@ -103,31 +104,51 @@ struct BulletMesh {
 
 class BulletWorld;
 
-// Bullet's world, which asks ours before it moves the bodies.
+// Whether a plane across the line between their middles has all of one convex body on one side and all of the other beyond, with more than
+// `margin` between them. Of the pairs whose boxes meet in a heap this is so for most.
+bool apart(const btCollisionObject& a, const btCollisionObject& b, float margin) {
+    const btTransform &at_a = a.getWorldTransform(), &at_b = b.getWorldTransform();
+    const btVector3 between = at_b.getOrigin() - at_a.getOrigin();
+    const float distance = between.length();
+    if (!(distance > margin)) return false;
+    const btVector3 way = between / distance;
+    const auto reaches = [&](const btCollisionObject& o, const btTransform& at) {
+        return reach(convex_of(o.getCollisionShape()), to_vec(way * at.getBasis()));
+    };
+    return distance - reaches(a, at_a) > margin + reaches(b, at_b);
+}
+
+// Bullet's world, which asks ours before it moves the bodies, with islands and a solver of our own.
 class Dynamics final : public btDiscreteDynamicsWorld {
 public:
     Dynamics(BulletWorld& owner, btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
-             btConstraintSolver* solver, btCollisionConfiguration* configuration)
-        : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration), owner_(owner) {}
+             btCollisionConfiguration* configuration)
+        : btDiscreteDynamicsWorld(dispatcher, broadphase, nullptr, configuration), owner_(owner) {}
 
 protected:
     void integrateTransforms(btScalar seconds) override;
+    void calculateSimulationIslands() override {}
+    void solveConstraints(btContactSolverInfo& settings) override {
+        if (m_nonStaticRigidBodies.size() == 0) return;
+        islands_.find({&m_nonStaticRigidBodies[0], size_t(m_nonStaticRigidBodies.size())}, *getDispatcher());
+        solver_.gravity = getGravity();
+        for (size_t i = 0; i < islands_.count(); ++i)
+            solver_.solve(islands_.bodies(i), islands_.manifolds(i), settings.m_timeStep);
+    }
 
 private:
     BulletWorld& owner_;
+    Islands islands_;
+    ContactSolver solver_;
 };
 
 class BulletWorld final : public World {
 public:
     explicit BulletWorld(const WorldSettings& settings) : World(settings.gravity) {
         set_globals();
+        dispatcher_.setNearCallback(look);
         dynamics_.setGravity(to_bullet(settings.gravity));
-        solver_.gravity = dynamics_.getGravity();
-        dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
-        btContactSolverInfo& solver = dynamics_.getSolverInfo();
         dynamics_.setForceUpdateAllAabbs(false);
-        solver.m_restitutionVelocityThreshold = 0.5f;
-        solver.m_minimumSolverBatchSize = 1;  // islands by themselves
     }
     ~BulletWorld() override {
         for (auto& o : objects_)
@@ -353,6 +374,21 @@ private:
         if (rests != o.rests) set_sleep(o, rests);
     }
 
+    // Pairs of convex bodies that are apart need no look at how they touch.
+    static void look(btBroadphasePair& pair, btCollisionDispatcher& dispatcher, const btDispatcherInfo& settings) {
+        const auto &a = *static_cast<const btCollisionObject*>(pair.m_pProxy0->m_clientObject),
+                   &b = *static_cast<const btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+        const bool convex = a.getCollisionShape()->isConvex() && b.getCollisionShape()->isConvex();
+        if (convex && apart(a, b, gContactBreakingThreshold)) {
+            if (pair.m_algorithm == nullptr) return;
+            btManifoldArray manifolds;
+            pair.m_algorithm->getAllContactManifolds(manifolds);
+            for (int i = 0; i < manifolds.size(); ++i) manifolds[i]->clearManifold();
+            return;
+        }
+        btCollisionDispatcher::defaultNearCallback(pair, dispatcher, settings);
+    }
+
     friend class Dynamics;
     // A continuous body that would go far in this step goes only as far as it meets something; its velocity stays, so the contact
     // that it then has stops it in the next step.
@@ -381,8 +417,7 @@ private:
     mutable btCollisionDispatcher dispatcher_{&configuration_};
     SdfAlgorithms algorithms_{dispatcher_};
     mutable btDbvtBroadphase broadphase_;
-    ContactSolver solver_;
-    Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &solver_, &configuration_};
+    Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &configuration_};
     std::vector<std::unique_ptr<Object>> objects_;
 };
 

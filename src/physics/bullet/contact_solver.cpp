@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kStorey = 4, kFew = 12, kMany = 40;  // iterations
 constexpr float kFast = 1;                         // m/s
+constexpr float kBounces = 0.5f;                   // m/s: what comes slower stays
 // An island ends its iterations when the last one changed the velocities of its bodies by less than 0.3 mm/s (root of the mean square).
 constexpr float kEnough = 1e-7f;
 // Metres: so deep nothing is done, so that what rests keeps touching, and from so deep on what rests is moved out too.
@@ -66,37 +67,23 @@ int ContactSolver::iterations(Manifolds manifolds, int moving) {
     return std::clamp(kStorey * high, kFew, kMany);
 }
 
-btScalar ContactSolver::solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
-                                   int manifold_count, btTypedConstraint**, int, const btContactSolverInfo& settings,
-                                   btIDebugDraw*, btDispatcher*) {
-    const Manifolds all(manifolds, size_t(manifold_count));
-    int moving = 0;
-    bool fast = false;
-    for (int i = 0; i < body_count; ++i) {
-        if (stands(bodies[i])) continue;
-        ++moving;
-        fast = fast || btRigidBody::upcast(bodies[i])->getLinearVelocity().length2() > kFast * kFast;
-    }
+void ContactSolver::solve(std::span<btRigidBody* const> bodies, Manifolds manifolds, float seconds) {
+    const bool alone = bodies.size() == 1;
     // What glides or rolls in a bowl, or turns over an edge, is a little too deep after each step: it is moved out, since a velocity given
     // for that would stay. What rests is pushed out: moved, it would lose touch again and again.
-    begin({bodies, size_t(body_count)}, all, settings, moving == 1 && fast);
+    begin(bodies, manifolds, seconds, alone && bodies[0]->getLinearVelocity().length2() > kFast * kFast);
     if (!contacts_.empty()) {
-        const int most = iterations(all, moving);
+        const int most = iterations(manifolds, int(bodies.size()));
         push_out(most);
         iterate(most);
     }
-    end(settings);
-    return 0;
+    end(seconds);
 }
 
-void ContactSolver::begin(std::span<btCollisionObject* const> objects, Manifolds manifolds,
-                          const btContactSolverInfo& settings, bool move_out) {
-    bodies_.assign(1, {nullptr, 0});  // what stands
+void ContactSolver::begin(std::span<btRigidBody* const> bodies, Manifolds manifolds, float seconds, bool move_out) {
+    bodies_.assign(1, {nullptr, 0});  // what stands still
     contacts_.clear();
-    const float seconds = settings.m_timeStep;
-    for (btCollisionObject* o : objects) {
-        const btRigidBody* body = btRigidBody::upcast(o);
-        if (body == nullptr || stands(o)) continue;
+    for (const btRigidBody* body : bodies) {
         Body& b = bodies_[number(*body)];
         b.inverse_mass = body->getInvMass();
         b.now.linear = to_quad(body->getLinearVelocity() + body->getTotalForce() * (b.inverse_mass * seconds));
@@ -114,7 +101,7 @@ void ContactSolver::begin(std::span<btCollisionObject* const> objects, Manifolds
     for (const btPersistentManifold* m : manifolds) most = std::max(most, m->getNumContacts());
     for (int i = 0; i < most; ++i)
         for (btPersistentManifold* m : manifolds)
-            if (i < m->getNumContacts()) meet(*m, m->getContactPoint(i), settings, move_out);
+            if (i < m->getNumContacts()) meet(*m, m->getContactPoint(i), seconds, move_out);
 }
 
 // What stands still is the first; what moves as it likes is one of its own, of no inverse mass.
@@ -129,14 +116,13 @@ uint32_t ContactSolver::number(const btRigidBody& body) {
     return out;
 }
 
-void ContactSolver::meet(const btPersistentManifold& manifold, btManifoldPoint& point,
-                         const btContactSolverInfo& settings, bool move_out) {
+void ContactSolver::meet(const btPersistentManifold& manifold, btManifoldPoint& point, float seconds, bool move_out) {
     const auto* first = btRigidBody::upcast(manifold.getBody0());
     const auto* second = btRigidBody::upcast(manifold.getBody1());
     const bool swapped = stands(first);
     if (swapped) std::swap(first, second);
     const uint32_t a = number(*first), b = number(*second);
-    const float seconds = settings.m_timeStep, inverse_mass = bodies_[a].inverse_mass + bodies_[b].inverse_mass;
+    const float inverse_mass = bodies_[a].inverse_mass + bodies_[b].inverse_mass;
     const btVector3 &on_a = swapped ? point.getPositionWorldOnB() : point.getPositionWorldOnA(),
                     &on_b = swapped ? point.getPositionWorldOnA() : point.getPositionWorldOnB();
     const btVector3 arm_a = on_a - first->getWorldTransform().getOrigin(),
@@ -169,7 +155,7 @@ void ContactSolver::meet(const btPersistentManifold& manifold, btManifoldPoint& 
     c.slide = 1 / (0.5f * (xx + yy) + std::sqrt(0.25f * (xx - yy) * (xx - yy) + xy * xy));
     c.friction = point.m_combinedFriction;
     const float now = axes[0].dot(first->getVelocityInLocalPoint(arm_a) - second->getVelocityInLocalPoint(arm_b));
-    if (-now > settings.m_restitutionVelocityThreshold) c.least = -now * point.m_combinedRestitution;
+    if (-now > kBounces) c.least = -now * point.m_combinedRestitution;
     const float depth = -point.getDistance();
     const float correction = std::max(depth - kSlop, 0.0f) * (move_out ? kMovedOut : kPushedOut) / seconds;
     if (!(depth > 0)) {
@@ -285,7 +271,7 @@ void ContactSolver::push_out(int most) {
         }
 }
 
-void ContactSolver::end(const btContactSolverInfo& settings) {
+void ContactSolver::end(float seconds) {
     for (const Contact& c : contacts_) {
         c.point->m_appliedImpulse = c.impulse[0];
         c.point->m_appliedImpulseLateral1 = c.impulse[1], c.point->m_appliedImpulseLateral2 = c.impulse[2];
@@ -298,7 +284,7 @@ void ContactSolver::end(const btContactSolverInfo& settings) {
         if (!pushed) continue;
         btTransform next;
         btTransformUtil::integrateTransform(body.getWorldTransform(), to_bullet(b.push.linear),
-                                            to_bullet(b.push.angular), settings.m_timeStep, next);
+                                            to_bullet(b.push.angular), seconds, next);
         body.setWorldTransform(next);
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// What the contacts of an island of Bullet's do to the velocities of its bodies: in place of Bullet's own solver, which knows joints and
+// What the contacts of an island (islands.h) do to the velocities of its bodies: in place of Bullet's own solver, which knows joints and
 // motors that nothing here has, and for that takes a third of a step.
 //
 // Sequential impulses (Catto, "Iterative Dynamics with Temporal Coherence", 2005) on Coulomb's cone, with nonsmooth conjugate gradients
@@ -15,16 +15,13 @@
 
 namespace kiln::physics {
 
-/// Of one world; its thread. Bodies have user indices of their own; constraints there are none.
-class ContactSolver final : public btConstraintSolver {
+/// Of one world; its thread. Bodies have user indices of their own.
+class ContactSolver {
 public:
     btVector3 gravity{0, 0, 0};
 
-    btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
-                        int manifold_count, btTypedConstraint** constraints, int constraint_count,
-                        const btContactSolverInfo& settings, btIDebugDraw* draw, btDispatcher* dispatcher) override;
-    void reset() override {}
-    btConstraintSolverType getSolverType() const override { return BT_NNCG_SOLVER; }
+    /// An island's bodies, all awake, and the pairs of them, and of them and what stands, that touch.
+    void solve(std::span<btRigidBody* const> bodies, std::span<btPersistentManifold* const> manifolds, float seconds);
 
 private:
     using Manifolds = std::span<btPersistentManifold* const>;
@@ -66,15 +63,13 @@ private:
 
     int storeys(Manifolds manifolds, int moving);
     int iterations(Manifolds manifolds, int moving);
-    void begin(std::span<btCollisionObject* const> objects, Manifolds manifolds, const btContactSolverInfo& settings,
-               bool move_out);
+    void begin(std::span<btRigidBody* const> bodies, Manifolds manifolds, float seconds, bool move_out);
     uint32_t number(const btRigidBody& body);
-    void meet(const btPersistentManifold& manifold, btManifoldPoint& point, const btContactSolverInfo& settings,
-              bool move_out);
+    void meet(const btPersistentManifold& manifold, btManifoldPoint& point, float seconds, bool move_out);
     Change sweep();
     void iterate(int most);
     void push_out(int most);
-    void end(const btContactSolverInfo& settings);
+    void end(float seconds);
 
     std::vector<int> height_;       // by the body's index
     std::vector<uint32_t> number_;  // in the island, by the body's index
