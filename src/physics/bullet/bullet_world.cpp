@@ -146,6 +146,7 @@ class BulletWorld final : public World {
 public:
     explicit BulletWorld(const WorldSettings& settings) : World(settings.gravity) {
         set_globals();
+        dispatcher_.setDispatcherFlags(0);  // touch within kMargin, whatever their size
         dispatcher_.setNearCallback(look);
         dynamics_.setGravity(to_bullet(settings.gravity));
         dynamics_.setForceUpdateAllAabbs(false);
