@@ -9,13 +9,13 @@ namespace kiln::physics {
 
 namespace {
 
-constexpr int kAlone = 12, kStorey = 6, kFew = 16, kMany = 40;  // iterations
+constexpr int kAlone = 12, kStorey = 6, kFew = 20, kMany = 40;  // iterations
 constexpr float kFast = 1;                                      // m/s
 constexpr float kBounces = 0.5f;                                // m/s: what comes slower stays
 // An island ends its iterations when the last one changed the velocities of its bodies by less than 1 mm/s (root of the mean square).
 constexpr float kEnough = 1e-6f;
 // Metres: so deep nothing is done, so that what rests keeps touching, and from so deep on what rests is moved out too.
-constexpr float kSlop = 5e-4f, kDeep = 0.04f;
+constexpr float kSlop = 1e-3f, kDeep = 0.04f;
 constexpr float kPushedOut = 0.2f, kMovedOut = 0.4f;  // of the depth, a step
 
 using Quad = float __attribute__((vector_size(16)));
