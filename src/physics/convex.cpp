@@ -87,6 +87,20 @@ dvec3 moments(const Convex& c) {
     return {};
 }
 
+float reach(const Convex& c, vec3 d) {
+    switch (c.kind) {
+    case Kind::Sphere:
+        return c.size.x;
+    case Kind::Box:
+        return std::abs(d.x) * c.size.x + std::abs(d.y) * c.size.y + std::abs(d.z) * c.size.z;
+    case Kind::Capsule:
+        return std::abs(d.y) * c.size.y + c.size.x;
+    case Kind::Cylinder:
+        return std::abs(d.y) * c.size.y + radial(d) * c.size.x;
+    }
+    return 0;
+}
+
 vec3 project(const Convex& c, vec3 p) {
     switch (c.kind) {
     case Kind::Sphere: {

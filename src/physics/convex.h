@@ -30,6 +30,8 @@ double volume(const Convex& c);
 /// Principal moments about the origin for a mass of 1 kg, kg m².
 dvec3 moments(const Convex& c);
 
+/// How far the solid goes from the origin along the unit vector d: the largest dot product of d and a point of it.
+float reach(const Convex& c, vec3 d);
 /// The point of the solid nearest to p.
 vec3 project(const Convex& c, vec3 p);
 

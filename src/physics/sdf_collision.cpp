@@ -242,7 +242,7 @@ void collide(const SdfShape& shape, const Convex& body, const Pose& shape_from_b
     collide(shape.bricks(), body, shape_from_body, margin + shape.bricks().error(), out);
     if (&shape.bricks() == &shape.field() || out.empty()) return;
     measure(shape, margin, out);
-    if (body.kind != Convex::Kind::Sphere || out.size() != 1) return;
+    if (body.kind != Convex::Kind::Sphere) return;
     settle_ball(shape, shape_from_body.position, body.size.x, margin, out);
 }
 

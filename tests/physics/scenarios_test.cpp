@@ -260,4 +260,15 @@ TEST_P(EachEngine, AKinematicFloorCarriesWhatStandsOnIt) {
     }
 }
 
+TEST_P(EachEngine, AKinematicFloorThatBeginsToMoveTakesAlongWhatHasLainOnItForLong) {
+    Scene s(GetParam());
+    const BodyId floor = s.add({.shape = Convex::box({3, 0.5f, 3}), .motion = Motion::Kinematic, .friction = 1});
+    const BodyId box = s.add({.shape = Convex::box({0.3f, 0.3f, 0.3f}), .pose = {{0, 0.8f, 0}, {}}, .friction = 1});
+    s.run(4);
+    s.world->set_velocity(floor, {0, 0.5f, 0}, {});
+    s.run(1);
+    EXPECT_NEAR(s.world->state(box).pose.position.y, 1.3f, 0.03f);
+    EXPECT_NEAR(s.world->state(floor).pose.position.y, 0.5f, 0.01f);
+}
+
 }  // namespace

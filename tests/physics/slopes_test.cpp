@@ -105,6 +105,25 @@ TEST_P(OnSlopes, ABoxStaysBelowTheAngleOfFrictionAndSlidesAbove) {
     }
 }
 
+TEST_P(OnSlopes, FrictionHoldsAsMuchWhicheverWayABoxSlides) {
+    const float mu = 0.5f, speed = 4;
+    for (const float degrees : {0.0f, 20.0f, 45.0f, 70.0f}) {
+        Scene s(GetParam());
+        s.ground({edit(Plane{})}, mu);
+        const vec3 ahead{std::cos(degrees * kPi / 180), 0, std::sin(degrees * kPi / 180)};
+        const BodyId id = s.add({.shape = Convex::box({0.5f, 0.2f, 0.5f}),
+                                 .pose = {{0, 0.2f, 0}, {}},
+                                 .friction = mu,
+                                 .linear_velocity = ahead * speed});
+        s.run(2);
+        const vec3 way = s.world->state(id).pose.position;
+        // A step's way late, as each step moves with the velocity at its end.
+        const float expected = speed * speed / (2 * mu * kGravity);
+        EXPECT_NEAR(dot(way, ahead), expected, 0.5f * speed * kStep + 0.01f * expected) << degrees;
+        EXPECT_LT(length(cross(way, ahead) - cross(vec3{0, 0.2f, 0}, ahead)), 0.02f) << degrees;
+    }
+}
+
 TEST_P(OnSlopes, FrictionOfAPairIsTheGeometricMeanAndBounceTheLarger) {
     for (const float ratio : {0.97f, 1.03f}) {
         const float degrees = std::atan(0.4f * ratio) * 180 / kPi;

@@ -2,17 +2,17 @@
 
 #include "physics/bullet/bullet_world.h"
 
+#include "physics/bullet/contact_solver.h"
+#include "physics/bullet/islands.h"
 #include "physics/bullet/region_edges.h"
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/sdf_collision.h"
 
 #include <BulletCollision/CollisionDispatch/btInternalEdgeUtility.h>
-#include <BulletDynamics/ConstraintSolver/btNNCGConstraintSolver.h>
 #include <btBulletDynamicsCommon.h>
 
 #include <algorithm>
 #include <cmath>
-#include <span>
 
 namespace kiln::physics {
 
@@ -102,107 +102,54 @@ struct BulletMesh {
     btTriangleInfoMap edges;
 };
 
-// Sequential impulses with conjugate gradients (Silcowitz-Hansen, Niebe and Erleben, 2010). What an iteration finds out at one contact it
-// tells the next ones of the same bodies, so how many are needed is a matter of how many bodies lie between one and the ground: a stack of
-// ten sways more and more with fewer than four a storey, a heap as wide as you like that is two high needs no more than one body.
-class Solver final : public btNNCGConstraintSolver {
-public:
-    btScalar solveGroup(btCollisionObject** bodies, int body_count, btPersistentManifold** manifolds,
-                        int manifold_count, btTypedConstraint** constraints, int constraint_count,
-                        const btContactSolverInfo& settings, btIDebugDraw* draw, btDispatcher* dispatcher) override {
-        btContactSolverInfo info = settings;
-        int moving = 0;
-        bool fast = false;
-        for (int i = 0; i < body_count; ++i) {
-            if (bodies[i]->isStaticOrKinematicObject()) continue;
-            ++moving;
-            fast = fast || bodies[i]->getInterpolationLinearVelocity().length2() > kFast * kFast;
-        }
-        const int high = moving < 3 ? moving : storeys({manifolds, size_t(manifold_count)}, moving);
-        info.m_numIterations = std::clamp(kStorey * high, kFew, kMany);
-        // An island ends its iterations when the last one changed the velocities of its bodies by less than 0.3 mm/s (root of the mean
-        // square).
-        info.m_leastSquaresResidualThreshold = kEnough * float(std::max(moving, 1));
-        // What glides or rolls in a bowl is a little too deep after each step: it is moved out, since a velocity given for that would stay.
-        // What rests is pushed out: moved, it would lose touch again and again.
-        if (moving == 1 && fast) info.m_splitImpulsePenetrationThreshold = 0;
-        return btNNCGConstraintSolver::solveGroup(bodies, body_count, manifolds, manifold_count, constraints,
-                                                  constraint_count, info, draw, dispatcher);
-    }
-
-    btVector3 gravity{0, 0, 0};
-
-private:
-    static constexpr int kStorey = 4, kFew = 12, kMany = 40;
-    static constexpr float kFast = 1;  // m/s
-    static constexpr float kEnough = 1e-7f;
-
-    // The most bodies between one and the ground, itself counted, by the shortest way down that carries it, as far as it matters. A wall
-    // carries nobody; what nothing carries falls, and bears nothing.
-    int storeys(std::span<btPersistentManifold* const> manifolds, int moving) {
-        constexpr int kTop = kMany / kStorey;
-        constexpr float kCarries = 0.3f;  // sine of the least slope of a push that holds somebody up
-        const float pull = gravity.length();
-        if (!(pull > 0)) return kTop;
-        const auto height = [&](const btCollisionObject* o) -> int& {
-            const size_t i = size_t(o->getUserIndex());
-            if (i >= height_.size()) height_.resize(i + 1, kTop);
-            return height_[i];
-        };
-        constexpr int kFalls = 1 << 20;
-        for (const btPersistentManifold* m : manifolds)
-            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
-                height(o) = o->isStaticOrKinematicObject() ? 0 : kFalls;
-        bool lower = true;
-        while (lower) {
-            lower = false;
-            for (const btPersistentManifold* m : manifolds) {
-                int &a = height(m->getBody0()), &b = height(m->getBody1());
-                for (int i = 0; i < m->getNumContacts(); ++i) {
-                    const float up = -m->getContactPoint(i).m_normalWorldOnB.dot(gravity) / pull;  // of body 0
-                    if (up > kCarries && a > b + 1) a = b + 1, lower = true;
-                    if (up < -kCarries && b > a + 1) b = a + 1, lower = true;
-                }
-            }
-        }
-        int out = 1;
-        for (const btPersistentManifold* m : manifolds)
-            for (const btCollisionObject* o : {m->getBody0(), m->getBody1()})
-                if (height(o) < kFalls) out = std::max(out, height(o));
-        return std::min({out, moving, kTop});
-    }
-    std::vector<int> height_;  // by the body's index
-};
-
 class BulletWorld;
 
-// Bullet's world, which asks ours before it moves the bodies.
+// Whether a plane across the line between their middles has all of one convex body on one side and all of the other beyond, with more than
+// `margin` between them. Of the pairs whose boxes meet in a heap this is so for most.
+bool apart(const btCollisionObject& a, const btCollisionObject& b, float margin) {
+    const btTransform &at_a = a.getWorldTransform(), &at_b = b.getWorldTransform();
+    const btVector3 between = at_b.getOrigin() - at_a.getOrigin();
+    const float distance = between.length();
+    if (!(distance > margin)) return false;
+    const btVector3 way = between / distance;
+    const auto reaches = [&](const btCollisionObject& o, const btTransform& at) {
+        return reach(convex_of(o.getCollisionShape()), to_vec(way * at.getBasis()));
+    };
+    return distance - reaches(a, at_a) > margin + reaches(b, at_b);
+}
+
+// Bullet's world, which asks ours before it moves the bodies, with islands and a solver of our own.
 class Dynamics final : public btDiscreteDynamicsWorld {
 public:
     Dynamics(BulletWorld& owner, btDispatcher* dispatcher, btBroadphaseInterface* broadphase,
-             btConstraintSolver* solver, btCollisionConfiguration* configuration)
-        : btDiscreteDynamicsWorld(dispatcher, broadphase, solver, configuration), owner_(owner) {}
+             btCollisionConfiguration* configuration)
+        : btDiscreteDynamicsWorld(dispatcher, broadphase, nullptr, configuration), owner_(owner) {}
 
 protected:
     void integrateTransforms(btScalar seconds) override;
+    void calculateSimulationIslands() override {}
+    void solveConstraints(btContactSolverInfo& settings) override {
+        if (m_nonStaticRigidBodies.size() == 0) return;
+        islands_.find({&m_nonStaticRigidBodies[0], size_t(m_nonStaticRigidBodies.size())}, *getDispatcher());
+        solver_.gravity = getGravity();
+        for (size_t i = 0; i < islands_.count(); ++i)
+            solver_.solve(islands_.bodies(i), islands_.manifolds(i), settings.m_timeStep);
+    }
 
 private:
     BulletWorld& owner_;
+    Islands islands_;
+    ContactSolver solver_;
 };
 
 class BulletWorld final : public World {
 public:
     explicit BulletWorld(const WorldSettings& settings) : World(settings.gravity) {
         set_globals();
+        dispatcher_.setDispatcherFlags(0);  // touch within kMargin, whatever their size
+        dispatcher_.setNearCallback(look);
         dynamics_.setGravity(to_bullet(settings.gravity));
-        solver_.gravity = dynamics_.getGravity();
-        dynamics_.getDispatchInfo().m_deterministicOverlappingPairs = true;
-        btContactSolverInfo& solver = dynamics_.getSolverInfo();
-        // One direction of friction lets stacks creep sideways; with two, the plain solver makes a stack of ten boxes sway more and more.
-        solver.m_solverMode |= SOLVER_USE_2_FRICTION_DIRECTIONS;
         dynamics_.setForceUpdateAllAabbs(false);
-        solver.m_restitutionVelocityThreshold = 0.5f;
-        solver.m_minimumSolverBatchSize = 1;  // islands by themselves
     }
     ~BulletWorld() override {
         for (auto& o : objects_)
@@ -279,8 +226,6 @@ protected:
         object->body->setLinearVelocity(to_bullet(b.settings.linear_velocity));
         object->body->setAngularVelocity(to_bullet(b.settings.angular_velocity));
         dynamics_.addRigidBody(object->body.get());
-        // Gyroscopic torque as Euler's equations have it, integrated implicitly so that thin bodies stay stable.
-        object->body->setFlags(object->body->getFlags() | BT_ENABLE_GYROSCOPIC_FORCE_IMPLICIT_BODY);
         object->anchor = to_pose(at);
         set_sleep(*object, false);
         objects_[index] = std::move(object);
@@ -430,6 +375,21 @@ private:
         if (rests != o.rests) set_sleep(o, rests);
     }
 
+    // Pairs of convex bodies that are apart need no look at how they touch.
+    static void look(btBroadphasePair& pair, btCollisionDispatcher& dispatcher, const btDispatcherInfo& settings) {
+        const auto &a = *static_cast<const btCollisionObject*>(pair.m_pProxy0->m_clientObject),
+                   &b = *static_cast<const btCollisionObject*>(pair.m_pProxy1->m_clientObject);
+        const bool convex = a.getCollisionShape()->isConvex() && b.getCollisionShape()->isConvex();
+        if (convex && apart(a, b, gContactBreakingThreshold)) {
+            if (pair.m_algorithm == nullptr) return;
+            btManifoldArray manifolds;
+            pair.m_algorithm->getAllContactManifolds(manifolds);
+            for (int i = 0; i < manifolds.size(); ++i) manifolds[i]->clearManifold();
+            return;
+        }
+        btCollisionDispatcher::defaultNearCallback(pair, dispatcher, settings);
+    }
+
     friend class Dynamics;
     // A continuous body that would go far in this step goes only as far as it meets something; its velocity stays, so the contact
     // that it then has stops it in the next step.
@@ -458,8 +418,7 @@ private:
     mutable btCollisionDispatcher dispatcher_{&configuration_};
     SdfAlgorithms algorithms_{dispatcher_};
     mutable btDbvtBroadphase broadphase_;
-    Solver solver_;
-    Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &solver_, &configuration_};
+    Dynamics dynamics_{*this, &dispatcher_, &broadphase_, &configuration_};
     std::vector<std::unique_ptr<Object>> objects_;
 };
 
