@@ -37,7 +37,7 @@ struct FrameParams {
     uint view;  // kiln::View
     uint material_count;
     float refine_reach;  // how far refining may move what march found, finest voxels, on the coarsest level or instance
-    uint pad_0;
+    int first_row;       // of the tile's images, where the first row of this frame's band of it is
 };
 
 KILN_CONST uint kFrameAccelerate = 1u;       // jump over empty cells
