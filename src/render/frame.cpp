@@ -122,6 +122,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
               (settings.cull_lights ? 0u : kFrameAllLights) | (ao_every(settings) != 0 ? kFrameAmbient : 0u) |
               (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
+    std::ranges::copy(field.planes(), p.planes);
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
     p.params_first = field.params_first();
