@@ -122,6 +122,7 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
               (settings.cull_lights ? 0u : kFrameAllLights) | (ao_every(settings) != 0 ? kFrameAmbient : 0u) |
               (field.outside_is_concave() ? kFrameOutsideConcave : 0u);
     p.outside_first = field.outside_first();
+    std::ranges::copy(field.planes(), p.planes);
     p.outside_count = field.outside_count();
     p.program_count = field.program_count();
     p.params_first = field.params_first();
@@ -159,9 +160,8 @@ Image image_of_words(Graph& g, std::string_view name, rhi::Extent size, std::spa
 }
 
 // `refined`: none where march's words are good enough.
-TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image* refined,
-                          const Image& mesh_ids) {
-    TileResult out;
+Surface find_surface(Graph& g, const TileInputs& in, const Image& words, const Image* refined, const Image& mesh_ids,
+                     TileResult& out) {
     const Image& asked = refined != nullptr ? *refined : words;
     Image seen = words;
     if (in.has_meshes)
@@ -172,35 +172,69 @@ TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Ima
     resolve_instances(g, in, asked, surface);
     if (in.has_meshes) resolve_meshes(g, in, surface);
     if (in.ao_every > 0) out.evaluations.push_back(g.readback(occlude(g, in, surface)));
+    return surface;
+}
+
+// From the light of what is solid to what comes back.
+void finish(Graph& g, const TileInputs& in, const Surface& surface, Image depth, Image radiance, TileResult& out) {
+    Front front = draw_through(g, in, surface, depth, radiance);
+    Image moved = in.taa ? motion(g, in, front.seen) : radiance;  // not read without
+    draw_particles(g, in, depth, front, radiance, moved);
+    if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.depth, moved);
+    if (in.upscales) {
+        radiance = taa_up(g, in, radiance, front.depth, moved);
+        depth = upscale_depth(g, in, depth);
+    }
+    out.radiance = g.readback(radiance);
+    out.depth = g.readback(depth);
+    if (!in.develops) return;
+    Buffer exposure = in.exposure;
+    if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
+    const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
+    Image shown = tonemap(g, radiance, glow, exposure, in.camera);
+    if (in.outline_hulls) shown = draw_hulls(g, in, surface.seen, depth, shown);
+    if (in.outline_count > 0 || in.outlines_meshes) shown = outline(g, in, surface.seen, shown);
+    shown = draw_lines(g, in, depth, shown);
+    out.shown = g.readback(shown);
+    out.exposure = g.readback(exposure);
+}
+
+TileResult record_shading(Graph& g, const TileInputs& in, View wanted, const Image& words, const Image* refined,
+                          const Image& mesh_ids) {
+    TileResult out;
+    const Surface surface = find_surface(g, in, words, refined, mesh_ids, out);
     Image depth = depth_of(g, in, surface.seen);
     if (wanted == View::Shaded) {
-        Image radiance = light(g, in, surface, depth);
-        Front front = draw_through(g, in, surface, depth, radiance);
-        Image moved = in.taa ? motion(g, in, front.seen) : radiance;  // not read without
-        draw_particles(g, in, depth, front, radiance, moved);
-        if (in.taa && !in.upscales) radiance = taa(g, in, radiance, front.depth, moved);
-        if (in.upscales) {
-            radiance = taa_up(g, in, radiance, front.depth, moved);
-            depth = upscale_depth(g, in, depth);
-        }
-        out.radiance = g.readback(radiance);
-        if (in.develops) {
-            Buffer exposure = in.exposure;
-            if (in.camera.auto_exposure) expose(g, radiance, exposure, in.elapsed, in.camera.exposure);
-            const Image glow = in.camera.bloom > 0 ? bloom(g, radiance, exposure, in.camera) : radiance;
-            Image shown = tonemap(g, radiance, glow, exposure, in.camera);
-            if (in.outline_hulls) shown = draw_hulls(g, in, surface.seen, depth, shown);
-            if (in.outline_count > 0 || in.outlines_meshes) shown = outline(g, in, surface.seen, shown);
-            shown = draw_lines(g, in, depth, shown);
-            out.shown = g.readback(shown);
-            out.exposure = g.readback(exposure);
-        }
-    } else {
-        const Shown shown = view(g, in, surface, depth);
-        out.radiance = g.readback(shown.values);
-        out.shown = g.readback(shown.bytes);
+        finish(g, in, surface, depth, light(g, in, surface, depth), out);
+        return out;
     }
+    const Shown shown = view(g, in, surface, depth);
+    out.radiance = g.readback(shown.values);
+    out.shown = g.readback(shown.bytes);
     out.depth = g.readback(depth);
+    return out;
+}
+
+// One band after the other, each into its rows of depth and radiance. `find`: the words of march and of refine of a band with these inputs,
+// which tells whether there are any of refine.
+template <typename Find>
+TileResult record_bands(Graph& g, const TileInputs& in, Find&& find) {
+    TileResult out;
+    Image depth = g.create("depth", {.size = in.size, .format = rhi::Format::R32Float});
+    Image radiance = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    for (const Band& band : in.bands) {
+        TileInputs of_band = in;
+        of_band.frame = band.frame;
+        of_band.size = band.size;
+        of_band.light_rects = band.light_rects;
+        of_band.lights_of_tile = band.lights_of_tile;
+        Image words, refined;
+        const bool moved = find(of_band, band, words, refined, out);
+        const Surface surface = find_surface(g, of_band, words, moved ? &refined : nullptr, {}, out);
+        depth_of(g, of_band, surface.seen, depth);
+        light(g, of_band, surface, depth, radiance);
+    }
+    finish(g, in, {}, depth, radiance, out);
     return out;
 }
 
@@ -230,6 +264,18 @@ Seen record_seen(Graph& g, const TileInputs& in) {
 }  // namespace
 
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted) {
+    if (!in.bands.empty()) {
+        return record_bands(
+            g, in, [&](const TileInputs& of_band, const Band&, Image& words, Image& refined, TileResult& out) {
+                const Seen seen = record_seen(g, of_band);
+                words = seen.words;
+                out.evaluations.insert(out.evaluations.end(), seen.evaluations.begin(), seen.evaluations.end());
+                if (!in.refine) return false;
+                refined = refine(g, of_band, words);
+                refine_instances(g, of_band, words, refined);
+                return true;
+            });
+    }
     Seen seen = record_seen(g, in);
     Image refined;
     if (in.refine) {
@@ -252,6 +298,17 @@ TileSeen record_visibility(Graph& g, const TileInputs& in) {
 
 TileResult record_tile(Graph& g, const TileInputs& in, View wanted, std::span<const uint32_t> visibility,
                        std::span<const uint32_t> refined, std::span<const uint32_t> mesh_ids) {
+    if (!in.bands.empty()) {
+        return record_bands(g, in, [&](const TileInputs&, const Band& band, Image& words, Image& moved, TileResult&) {
+            const auto rows = [&](std::span<const uint32_t> all) {
+                const size_t row = size_t{4} * in.size.width;
+                return all.subspan(band.y * row, band.size.height * row);
+            };
+            words = image_of_words(g, "visibility", band.size, rows(visibility));
+            moved = image_of_words(g, "refined", band.size, rows(refined));
+            return true;
+        });
+    }
     const Image words = image_of_words(g, "visibility", in.size, visibility);
     Image ids;
     if (in.has_meshes)

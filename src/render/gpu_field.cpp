@@ -36,6 +36,38 @@ bool any_cpu_only(std::span<const sdf::Instruction> code) {
     return std::any_of(code.begin(), code.end(), [](const sdf::Instruction& in) { return in.cpu_only(); });
 }
 
+// An edit that is a half-space, added without a blend; nothing when it is more.
+std::optional<HorizonPlane> plane_of(std::span<const sdf::Instruction> code, const AppendArray<float>& params) {
+    HorizonPlane out{
+        .normal_x = 0, .normal_y = 1, .normal_z = 0, .scale = 0, .at_x = 0, .at_y = 0, .at_z = 0, .material = 0};
+    for (const sdf::Instruction in : code) {
+        const auto number = [&](size_t i) { return params[in.param + i]; };
+        if (in.moves_point() && out.scale != 0) return {};
+        switch (in.opcode()) {
+        case sdf::Opcode::PointCell:
+            break;
+        case sdf::Opcode::PointTranslate:
+            out.at_x = number(0), out.at_y = number(1), out.at_z = number(2);
+            break;
+        case sdf::Opcode::PointAffine:  // of the matrix the row that makes y
+            out.at_x = number(0), out.at_y = number(1), out.at_z = number(2);
+            out.normal_x = number(6), out.normal_y = number(7), out.normal_z = number(8);
+            break;
+        case sdf::Opcode::Shape:
+            if (in.aux() != uint32_t(ShapeKind::Plane) || out.scale != 0) return {};
+            out.scale = number(0);
+            out.material = uint32_t(number(1));
+            break;
+        case sdf::Opcode::Combine:
+            if (Op(in.aux() & 3u) != Op::Union || number(0) != 0 || number(1) != 0) return {};
+            break;
+        default:
+            return {};
+        }
+    }
+    return out;
+}
+
 uint32_t ceil_div(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
 
 }  // namespace
@@ -228,6 +260,7 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
     bool adds = false;
     bool concave = true;
+    planes_.clear();
     std::vector<uint32_t> rows;
     program.index.everywhere(rows);
     std::sort(rows.begin(), rows.end(),
@@ -246,6 +279,7 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
             }
             out.push_back(in);
         }
+        planes_.push_back(plane_of(code, program.params).value_or(HorizonPlane{}));
         if (edit.op == Op::Paint) continue;         // changes no distance
         concave = concave && edit.op == Op::Union;  // the smooth minimum of concave functions is concave
         for (const sdf::Instruction in : code) {
@@ -257,6 +291,9 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     }
     if (!adds) out.clear();
     outside_is_concave_ = adds && concave;
+    const auto not_plain = [](const HorizonPlane& plane) { return plane.scale == 0; };
+    if (!outside_is_concave_ || planes_.size() > size_t(kMostPlanes) || std::ranges::any_of(planes_, not_plain))
+        planes_.clear();
     return out;
 }
 
@@ -337,6 +374,7 @@ Result<void> GpuField::store_programs(const AppendArray<float>* old_samples, con
     use_ = both(software ? inside : any_kind(inside), use_known_ ? use_ : none);
     // Half-spaces are few kinds whatever the world: a kernel of its own on every device.
     outside_use_ = both(software || outside_is_concave_ ? leaves : any_kind(leaves), use_known_ ? outside_use_ : none);
+    outside_use_.planes = uint32_t(planes_.size());
     use_known_ = true;
     outside_count_ = uint32_t(outside.size());
     programs.insert(programs.end(), outside.begin(), outside.end());

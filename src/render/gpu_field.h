@@ -7,6 +7,7 @@
 #include "field/field.h"
 #include "field/host_bricks.h"
 #include "render/graph.h"
+#include "render/passes/frame.gpu.h"
 #include "render/passes/tape_use.h"
 #include "rhi/device.h"
 
@@ -72,6 +73,8 @@ public:
     bool leaves_grid() const { return outside_count_ != 0; }
     // Nothing but half-spaces, in unions, leaves the grid: along any ray the field there is a concave function.
     bool outside_is_concave() const { return outside_is_concave_; }
+    // They, where they are at most kMostPlanes and without blends; else none.
+    std::span<const HorizonPlane> planes() const { return planes_; }
     // What kernels that run the tapes are made for. `outside`: on the tape of what leaves the grid alone.
     const TapeUse& use(bool outside) const { return outside ? outside_use_ : use_; }
     uint32_t params_first() const;   // in the numbers buffer
@@ -144,6 +147,7 @@ private:
     uint64_t atlas_number_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
     bool outside_is_concave_ = false;
+    std::vector<HorizonPlane> planes_;
     TapeUse use_, outside_use_;
     bool use_known_ = false;  // both only ever grow from there
     uint32_t bricks_baked_ = 0, bricks_on_host_ = 0;

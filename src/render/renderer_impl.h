@@ -123,6 +123,9 @@ struct Renderer::Impl {
     // The parts of a tile behind which something lets light through.
     void find_through(render::Graph& g, const Frame& frame, const render::FrameParams& params,
                       render::TileInputs& in) const;
+    // Rows that a frame's passes may draw one after the other; they want it whole: none.
+    void find_bands(render::Graph& g, const Frame& frame, const render::FrameParams& params,
+                    render::TileInputs& in) const;
     void add_times(const render::FrameTimes& times);
     // What the device complained about, as this call's error.
     Result<void> healthy() {

@@ -6,6 +6,7 @@
 #include "render/lib/pack.h"
 #include "render/light_rects.h"
 #include "render/passes/cascades.h"
+#include "render/passes/cluster.gpu.h"
 #include "render/passes/instances.h"
 #include "render/passes/lamps.h"
 #include "render/picture.h"
@@ -19,6 +20,20 @@
 namespace kiln {
 
 using namespace render;
+
+namespace {
+
+// Of a part of the picture.
+LightRects rects_in(const Frame& frame, const FrameParams& part) {
+    LightRects out =
+        (part.flags & kFrameAllLights) == 0
+            ? light_rects(frame.lights, part.camera, part.tile_x, part.tile_y, part.tile_width, part.tile_height)
+            : all_light_rects(frame.lights.size(), part.tile_width, part.tile_height);
+    if (out.rects.empty()) out.rects.emplace_back();
+    return out;
+}
+
+}  // namespace
 
 void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const {
     if (!in.has_glass && !in.has_blends) return;
@@ -41,19 +56,36 @@ void Renderer::Impl::find_through(Graph& g, const Frame& frame, const FrameParam
         out.frame = g.block(part);
         part.flags |= kFrameRays;
         out.frame_of_rays = g.block(part);
+        const LightRects rects = rects_in(frame, part);
+        out.lights_of_tile = rects.most;
+        out.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
         part.tile_height *= 2;
         out.frame_of_parted = g.block(part);
-        LightRects rects = (part.flags & kFrameAllLights) == 0
-                               ? light_rects(frame.lights, params.camera, rect.x, rect.y, rect.width, rect.height)
-                               : all_light_rects(frame.lights.size(), rect.width, rect.height);
-        out.lights_of_tile = rects.most;
-        if (rects.rects.empty()) rects.rects.emplace_back();
-        out.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
     }
     if (in.through.empty()) return;
     LightRects all = all_light_rects(frame.lights.size(), params.tile_width, 2 * params.tile_height);
     if (all.rects.empty()) all.rects.emplace_back();
     in.all_light_rects = g.upload("light rects", std::span<const LightRect>(all.rects));
+}
+
+void Renderer::Impl::find_bands(Graph& g, const Frame& frame, const FrameParams& params, TileInputs& in) const {
+    // Passes that look at neighbours, at pictures before or at surfaces once more want them whole.
+    const bool whole = in.has_meshes || in.rt || in.taa || in.ao_every > 0 || !in.through.empty() ||
+                       in.outline_count > 0 || in.outlines_meshes || in.outline_hulls || in.volume_count > 0;
+    const int rows = ((params.tile_height + 1) / 2 + kClusterSide - 1) / kClusterSide * kClusterSide;
+    if (whole || params.view != uint32_t(View::Shaded) || rows >= params.tile_height) return;
+    for (int y = 0; y < params.tile_height; y += rows) {
+        FrameParams part = params;
+        part.tile_y += y;
+        part.tile_height = std::min(rows, params.tile_height - y);
+        part.first_row = y;
+        const LightRects rects = rects_in(frame, part);
+        in.bands.push_back({.y = uint32_t(y),
+                            .size = {uint32_t(part.tile_width), uint32_t(part.tile_height)},
+                            .frame = g.block(part),
+                            .light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects)),
+                            .lights_of_tile = rects.most});
+    }
 }
 
 void Renderer::Impl::draw_maps(Graph& g, const Frame& frame, const RenderSettings& settings, const FrameParams& params,
@@ -117,12 +149,10 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
                 if (faces.of[i] != 0) lights[i].color.w = faces.of[i];
         }
         in.light_count = uint32_t(lights.size());
-        LightRects rects = settings.cull_lights ? light_rects(frame.lights, params.camera, params.tile_x, params.tile_y,
-                                                              params.tile_width, params.tile_height)
-                                                : all_light_rects(lights.size(), params.tile_width, params.tile_height);
+        const LightRects rects = rects_in(frame, params);
         in.lights_of_tile = rects.most;
         in.local_lights = rects.local;
-        if (lights.empty()) lights.emplace_back(), rects.rects.emplace_back();
+        if (lights.empty()) lights.emplace_back();
         in.light_rects = g.upload("light rects", std::span<const LightRect>(rects.rects));
         in.lights = g.upload("lights", std::span<const shade::LightRecord>(lights));
         in.ggx_table = g.import("ggx albedo", ggx_table);
@@ -181,6 +211,7 @@ Result<void> Renderer::Impl::render_tile(const Frame& frame, const RenderSetting
         if (in.has_cascades || in.has_lamps) draw_maps(g, frame, settings, params, in);
         if (in.rt) in.boxes = boxes->import(g);
         find_through(g, frame, params, in);
+        find_bands(g, frame, params, in);
         if (in.has_particles) {
             const ParticleBins bins = particle_bins(frame.particles, params.camera, params.tile_x, params.tile_y,
                                                     params.tile_width, params.tile_height);

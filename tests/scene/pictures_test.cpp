@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <numbers>
+#include <optional>
 #include <string_view>
 
 namespace kiln {
@@ -45,13 +46,21 @@ struct Pair {
     }
 };
 
+// None: the test is skipped, or has failed where a device is required.
+std::optional<Renderer> renderer_or_skip() {
+    auto made = Renderer::create({.validation = true});
+    if (made) return std::move(*made);
+    const char* required = std::getenv("REQUIRE_VULKAN");
+    [&] {
+        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << made.error().message;
+        GTEST_SKIP() << made.error().message;
+    }();
+    return {};
+}
+
 TEST(PicturesGpu, BricksShowWhatTheProgramSaysInEveryScene) {
-    auto renderer = Renderer::create({.validation = true});
-    if (!renderer) {
-        const char* required = std::getenv("REQUIRE_VULKAN");
-        ASSERT_FALSE(required != nullptr && std::string_view(required) == "1") << renderer.error().message;
-        GTEST_SKIP() << renderer.error().message;
-    }
+    auto renderer = renderer_or_skip();
+    if (!renderer) return;
     for (const auto& [name, what] : bundled_scenes()) {
         const auto world = World::load(name);
         ASSERT_TRUE(world) << world.error().message;
@@ -89,6 +98,26 @@ TEST(PicturesGpu, BricksShowWhatTheProgramSaysInEveryScene) {
         EXPECT_GT(judged, 500) << name;
         // What is left: ledges lower than that, which the quarry has everywhere, and tangent rays. At four times the pixels 6 of 84,000.
         EXPECT_LE(off, judged / 2000) << name << " of " << judged;
+    }
+}
+
+// The gate of the graph: what lives at one time is at most six tenths of all images and buffers of a picture.
+TEST(PicturesSlowGpu, EverySceneSharesItsTransientsAtEveryQuality) {
+    auto renderer = renderer_or_skip();
+    if (!renderer) return;
+    for (const auto& [name, what] : bundled_scenes()) {
+        const auto world = World::load(name);
+        ASSERT_TRUE(world) << world.error().message;
+        const auto frame = world->frame();
+        ASSERT_TRUE(frame) << frame.error().message;
+        for (const Quality q : {Quality::Low, Quality::Medium, Quality::High, Quality::Ultra}) {
+            RenderSettings settings{.width = 480, .height = 270, .cut = true};
+            set_quality(settings, q);
+            ASSERT_TRUE(renderer->render(*frame, settings)) << name;
+            const RenderStats& s = renderer->stats();
+            EXPECT_GT(s.transient_peak_bytes, 0u);
+            EXPECT_LE(double(s.transient_peak_bytes), 0.6 * double(s.transient_sum_bytes)) << name << " at " << int(q);
+        }
     }
 }
 

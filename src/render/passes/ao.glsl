@@ -70,8 +70,7 @@ float ao_reach(vec3 p, vec3 direction) {
 #ifdef KILN_EXACT
 // Half-spaces that leave the grid hide what is below their horizon.
 bool above_horizon(vec3 p, vec3 direction) {
-    uvec2 outside = code_of(kSeenOutside, 0);
-    return tape_distance(outside.x, outside.y, (vec3(shadow_whole) + p + direction * 1e5) * frame.grid.voxel_size) > 0.0;
+    return code_distance(code_of(kSeenOutside, 0), (vec3(shadow_whole) + p + direction * 1e5) * frame.grid.voxel_size) > 0.0;
 }
 #endif
 

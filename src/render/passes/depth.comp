@@ -16,5 +16,5 @@ layout(set = 0, binding = 2, r32f) writeonly uniform image2D depth;
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
-    imageStore(depth, pixel, vec4(depth_of(texelFetch(seen, pixel, 0), frame.grid.voxel_size)));
+    imageStore(depth, pixel + ivec2(0, frame.first_row), vec4(depth_of(texelFetch(seen, pixel, 0), frame.grid.voxel_size)));
 }

@@ -43,7 +43,7 @@ ExactHit exact_march(TexelRay ray, float t_end, bool look_in_cells, bool jump) {
             fresh = true;
         }
         uvec2 segment_code = code_of(w.state, w.slot);
-        float d = tape_distance(segment_code.x, segment_code.y, origin + ray.direction * (w.t * h)) / h;
+        float d = code_distance(segment_code, origin + ray.direction * (w.t * h)) / h;
         hit.steps++;
         bool concave = w.state == kSeenOutside && (frame.flags & kFrameOutsideConcave) != 0u;
         if (!bracketed && d <= 0.0) {

@@ -18,6 +18,15 @@ using uint = uint32_t;
 
 KILN_CONST int kTileGroup = 8;  // a workgroup of the picture's kernels is 8 x 8 pixels
 
+// A half-space that leaves the grid, where such are few and plainly added: scale * dot(normal, p - at), in metres.
+struct HorizonPlane {
+    float normal_x, normal_y, normal_z;
+    float scale;
+    float at_x, at_y, at_z;
+    uint material;
+};
+KILN_CONST int kMostPlanes = 4;
+
 struct FrameParams {
     GridParams grid;                           // of a clipmap: the box that its levels fill, in finest cells
     int eye_x, eye_y, eye_z;                   // the camera: voxel it is in
@@ -37,7 +46,8 @@ struct FrameParams {
     uint view;  // kiln::View
     uint material_count;
     float refine_reach;  // how far refining may move what march found, finest voxels, on the coarsest level or instance
-    uint pad_0;
+    int first_row;       // of the tile's images, where the first row of this frame's band of it is
+    HorizonPlane planes[kMostPlanes];  // as many as kernels are made for, see TapeUse
 };
 
 KILN_CONST uint kFrameAccelerate = 1u;       // jump over empty cells
@@ -81,6 +91,7 @@ KILN_CONST uint kSeenMesh = 6u;     // triangle `slot` of the frame's meshes; z:
 KILN_CONST uint kSeenInstance = 7u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameParams) == 256 && sizeof(FrameRay) == 48 && sizeof(MaterialRecord) == 32);
+static_assert(sizeof(FrameParams) == 384 && sizeof(HorizonPlane) == 32 && sizeof(FrameRay) == 48 &&
+              sizeof(MaterialRecord) == 32);
 }  // namespace kiln::render
 #endif

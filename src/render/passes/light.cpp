@@ -27,13 +27,18 @@ const Kernel& light_kernel(const TileInputs& in) {
 }
 
 Image light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth) {
+    Image radiance = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
+    light(g, in, surface, depth, radiance);
+    return radiance;
+}
+
+void light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth, Image& radiance) {
     const Image& visibility = surface.seen;
     const Buffer masks = cluster(g, in, visibility);
     const bool batches = in.lights_of_tile > kLightsAtOnce;
     Buffer sums =
         g.create_buffer("light sums", batches ? uint64_t{in.size.width} * in.size.height * 3 * sizeof(float) : 16);
     g.clear(sums);
-    Image radiance = g.create("radiance", {.size = in.size, .format = rhi::Format::Rgba16Float});
     Image of_volumes;
     if (in.volume_count > 0)
         of_volumes = g.create("light of volumes", {.size = in.size, .format = rhi::Format::Rgba16Float});
@@ -61,7 +66,6 @@ Image light(Graph& g, const TileInputs& in, const Surface& surface, const Image&
         g.dispatch(in.volume_count > 0 ? light_over_kernel(in) : light_kernel(in), in.size, uses, push);
         first = next;
     } while (first < in.lights_of_tile);
-    return radiance;
 }
 
 }  // namespace kiln::render

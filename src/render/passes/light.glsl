@@ -49,13 +49,14 @@ void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;
     TexelRay ray = pixel_ray(pixel);
-    float metres = texelFetch(depth, pixel, 0).r;
+    ivec2 in_tile = pixel + ivec2(0, frame.first_row);
+    float metres = texelFetch(depth, in_tile, 0).r;
     bool first = push.first_light == 0u;
     vec3 sum = vec3(0.0);
     if (isinf(metres)) {
         if (!first) return;
         sum = kImageSky ? environment_radiance(ray.direction) * frame.sky.c0.rgb : sky_radiance(frame.sky, ray.direction);
-        imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 0.0));
+        imageStore(radiance, in_tile, vec4(min(sum, vec3(kBrightestStored)), 0.0));
         return;
     }
     LightWalk walk = light_walk(pixel, push.first_light);
@@ -106,5 +107,5 @@ void main() {
 #ifdef KILN_VOLUMES
     sum += texelFetch(of_volumes, pixel, 0).rgb;
 #endif
-    imageStore(radiance, pixel, vec4(min(sum, vec3(kBrightestStored)), 1.0));
+    imageStore(radiance, in_tile, vec4(min(sum, vec3(kBrightestStored)), 1.0));
 }

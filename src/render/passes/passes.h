@@ -103,6 +103,15 @@ struct ThroughPart {
     uint32_t lights_of_tile = 0;
 };
 
+// Rows of a tile that are marched and lit by themselves, so that its other images need be no larger.
+struct Band {
+    uint32_t y = 0;  // its first row in the tile
+    rhi::Extent size;
+    Block frame;  // FrameParams
+    Buffer light_rects;
+    uint32_t lights_of_tile = 0;
+};
+
 // What every pass of one tile reads.
 struct TileInputs {
     FieldHandles field;
@@ -157,6 +166,7 @@ struct TileInputs {
     int transparent_layers = 0;
     int glass_bounces = 0;  // inside glass
     std::vector<ThroughPart> through;
+    std::vector<Band> bands;       // from the top down; none: the tile is drawn whole
     bool outlines_meshes = false;  // their records follow those of edits
     bool outline_hulls = false;    // … or are not used: see draw_hulls()
     bool has_particles = false;
@@ -195,6 +205,7 @@ struct Surface {
 };
 // Metres along the ray of what resolved words see, +infinity where that is nothing.
 Image depth_of(Graph& g, const TileInputs& in, const Image& seen);
+void depth_of(Graph& g, const TileInputs& in, const Image& seen, Image& depth);  // a band's rows of it
 // The words with t where refine() has the surface.
 Image settle(Graph& g, const TileInputs& in, const Image& visibility, const Image& refined);
 // `seen`: settled words. `refined`: what refine() answers; any image of words without kFrameRefine.
@@ -247,6 +258,7 @@ Image shadow(Graph& g, const TileInputs& in, const Image& visibility, const Surf
 const Kernel& light_kernel(const TileInputs& in);
 // Scene-linear radiance, before exposure. `depth`: depth_of() what is seen.
 Image light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth);
+void light(Graph& g, const TileInputs& in, const Surface& surface, const Image& depth, Image& radiance);
 
 // Where each pixel's surface was in the frame before; see motion.comp.
 Image motion(Graph& g, const TileInputs& in, const Image& visibility);

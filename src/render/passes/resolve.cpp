@@ -44,8 +44,12 @@ Surface resolve(Graph& g, const TileInputs& in, const Image& seen, const Image& 
 
 Image depth_of(Graph& g, const TileInputs& in, const Image& seen) {
     Image out = g.create("depth", {.size = in.size, .format = rhi::Format::R32Float});
-    g.dispatch(kDepthOf, in.size, {g.uniform(in.frame), g.read(seen), g.write(out)});
+    depth_of(g, in, seen, out);
     return out;
+}
+
+void depth_of(Graph& g, const TileInputs& in, const Image& seen, Image& depth) {
+    g.dispatch(kDepthOf, in.size, {g.uniform(in.frame), g.read(seen), g.write(depth)});
 }
 
 }  // namespace kiln::render

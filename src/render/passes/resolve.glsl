@@ -83,6 +83,11 @@ void main() {
         add_material(s, tables[slot * kBrickTableWords + int(mixed.slot0)], 1.0 - mixed.share);
         if (mixed.share > 0.0) add_material(s, tables[slot * kBrickTableWords + int(mixed.slot1)], mixed.share);
 #ifdef KILN_EXACT
+    } else if (state != kSeenInside && kPlanes > 0) {
+        float d;
+        HorizonPlane plane = frame.planes[nearest_plane(seen_point(ray, seen), d)];
+        s.normal = normalize(vec3(plane.normal_x, plane.normal_y, plane.normal_z));
+        add_material(s, plane.material, 1.0);
     } else if (state != kSeenInside) {
         uvec2 here_code = code_of(state, slot);
         float h = frame.grid.voxel_size;

@@ -57,8 +57,7 @@ layout(constant_id = 5) const bool kAlongCode = true;
 // Half-spaces reach to infinity: they hide what of the disc is below their horizon, wherever the ray meets them.
 float above_horizons(vec3 p, vec3 l, float tan_radius, float distance_voxels) {
     float far = min(distance_voxels, 1e5);
-    uvec2 outside = code_of(kSeenOutside, 0);
-    float height = tape_distance(outside.x, outside.y, (vec3(shadow_whole) + p + l * far) * frame.grid.voxel_size) / frame.grid.voxel_size;
+    float height = code_distance(code_of(kSeenOutside, 0), (vec3(shadow_whole) + p + l * far) * frame.grid.voxel_size) / frame.grid.voxel_size;
     return tan_radius > 0.0 ? disc_visible(height / (far * tan_radius)) : (height > 0.0 ? 1.0 : 0.0);
 }
 #endif

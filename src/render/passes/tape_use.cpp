@@ -53,15 +53,18 @@ const Kernel& specialised(const Kernel& kernel, const TapeUse& use) {
     static std::mutex mutex;
     static std::map<std::string, std::unique_ptr<Specialised>> made;
     const std::lock_guard lock(mutex);
-    const std::string name =
-        formatted("{} [{:x} {:x} {:x} {}]", kernel.name, use.shapes, use.warps, use.opcodes, use.registers);
+    const std::string name = formatted("{} [{:x} {:x} {:x} {} {}]", kernel.name, use.shapes, use.warps, use.opcodes,
+                                       use.registers, use.planes);
     std::unique_ptr<Specialised>& slot = made[name];
     if (!slot) {
         slot = std::make_unique<Specialised>();
         slot->name = name;
         slot->constants.assign(kernel.constants.begin(), kernel.constants.end());
-        for (const rhi::SpecConstant c :
-             {rhi::SpecConstant{1, use.shapes}, {2, use.warps}, {3, use.opcodes}, {4, use.registers}}) {
+        for (const rhi::SpecConstant c : {rhi::SpecConstant{1, use.shapes},
+                                          {2, use.warps},
+                                          {3, use.opcodes},
+                                          {4, use.registers},
+                                          {8, use.planes}}) {
             slot->constants.push_back(c);
         }
         slot->kernel = {slot->name, kernel.spirv, slot->constants};

@@ -5,6 +5,7 @@ layout(constant_id = 1) const uint kShapesUsed = 0xffffffffu;   // a bit a kind
 layout(constant_id = 2) const uint kWarpsUsed = 0xffffffffu;
 layout(constant_id = 3) const uint kOpcodesUsed = 0xffffffffu;
 layout(constant_id = 4) const int kRegistersUsed = 24;
+layout(constant_id = 8) const int kPlanes = 0;
 
 #define KILN_USES_SHAPE(kind) ((kShapesUsed & (1u << kind)) != 0u)
 #define KILN_USES_WARP(kind) ((kWarpsUsed & (1u << kind)) != 0u)

@@ -12,6 +12,7 @@ namespace kiln::render {
 struct TapeUse {
     uint32_t shapes = ~0u, warps = ~0u, opcodes = ~0u;  // a bit a kind
     uint32_t registers = sdf::kRegisters;
+    uint32_t planes = 0;  // the code is so many half-spaces, which FrameParams has; 0: it is run
     friend bool operator==(const TapeUse&, const TapeUse&) = default;
 };
 TapeUse tape_use(std::span<const sdf::Instruction> code);
