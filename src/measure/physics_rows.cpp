@@ -10,6 +10,7 @@
 #include "field/meshing.h"
 #include "measure/contest.h"
 #include "measure/recipes.h"
+#include "measure/slow_mesh.h"
 #include "physics/physics.h"
 
 #include "base/parallel_for.h"
@@ -108,6 +109,8 @@ public:
             collider(false);
             collider(true);
         }
+        if ((standard_ && run_.wanted("physics", "mesh.region")) || run_.wanted("physics", "mesh.collider"))
+            region_meshes();
     }
 
 private:
@@ -316,6 +319,81 @@ private:
         world.remove(*id);
     }
 
+    // The terrain's settled ground: triangles of eight regions, with their aprons, and what an engine makes of them to collide with. Beside
+    // it the engine's own body of the same triangles. What the slow way holds the triangles against is one mesh of the whole, by the
+    // lattice edges that corners lie on: regions lay corners on the surface, which no other mesh does.
+    void region_meshes() {
+        run_.stage(name("mesh"));
+        const auto exact = exact_of(terrain(run_.options.seed));
+        auto made = make_world(engine_, {});
+        if (!made) return run_.fail(made.error());
+        World& world = **made;
+        std::vector<std::shared_ptr<RegionMesh>> meshes(8);
+        const auto region = [](size_t i) { return ivec3{int(i & 1) - 1, int(i >> 1 & 1) - 1, int(i >> 2) - 1}; };
+        const auto mesh_all = [&] {
+            for (size_t i = 0; i < meshes.size(); ++i) meshes[i] = mesh_region(*exact, kVoxel, region(i));
+        };
+        mesh_all();
+        double all = 0, own = 0;
+        std::vector<std::shared_ptr<const Triangles>> bodies;
+        for (const auto& mesh : meshes) {
+            all += double(mesh->indices.size() / 3);
+            own += double(mesh->own());
+            if (mesh->own() == 0) continue;
+            Triangles t;
+            t.vertices = mesh->vertices, t.indices = mesh->indices;
+            t.solid = SdfShape::fixed(exact);
+            bodies.push_back(std::make_shared<const Triangles>(std::move(t)));
+        }
+        bool usable = true;
+        const std::vector<double> least = least_seconds(
+            run_.options.runs, {[&] { return seconds_of(mesh_all); },
+                                [&] {
+                                    return seconds_of([&] {
+                                        for (const auto& mesh : meshes) {
+                                            mesh->made = world.region_builder()(*mesh);
+                                            usable &= mesh->made != nullptr || mesh->own() == 0;
+                                        }
+                                    });
+                                },
+                                [&] {
+                                    return seconds_of([&] {
+                                        for (const auto& body : bodies) {
+                                            const auto id = world.add({.shape = body, .motion = Motion::Static});
+                                            if (!id) return run_.fail(id.error());
+                                            world.remove(*id);
+                                        }
+                                    });
+                                }});
+        if (!usable)
+            return run_.fail(
+                Error{formatted("bench physics/mesh.collider: {} refused a region", engine_), ErrorKind::Failed});
+        uint64_t hash = 0;
+        for (const auto& mesh : meshes)
+            hash += checksum_of_edges(mesh->vertices, std::span(mesh->indices).first(3 * size_t(mesh->own())), kVoxel);
+        const Box3 whole{meshes.front()->box().min, meshes.back()->box().max};
+        const auto host = field::HostBricks::build(std::make_shared<const sdf::Program>(exact->program()),
+                                                   {.voxel_size = kVoxel, .bounds = whole});
+        if (!host) return run_.fail(host.error());
+        const uint64_t slow = edges_by_voxel(*host, whole);
+        const auto add = [&](std::string_view row, std::string called, double triangles, double seconds) {
+            BenchRow out;
+            out.name = std::move(called);
+            out.value = triangles / seconds / 1e6;
+            out.unit = "Mtri/s";
+            out.more_is_better = true;
+            if (row == "mesh.collider") {
+                out.peer = formatted("{}, its own mesh", engine_);
+                out.peer_value = triangles / least[2] / 1e6;
+                out.ratio = out.value / out.peer_value;
+            }
+            out.seed = run_.options.seed;
+            if (run_.wanted("physics", row)) run_.add_checked(out, hash, slow);
+        };
+        if (standard_) add("mesh.region", "mesh.region", own, least[0]);
+        add("mesh.collider", name("mesh.collider"), all, least[1]);
+    }
+
     BenchRun& run_;
     std::string engine_;
     bool standard_;  // the default engine, whose rows have no suffix
@@ -325,9 +403,9 @@ private:
 
 BenchFamily physics_family() {
     return {{"physics",
-             "1000 bodies on a terrain, a pile of 100 tori (fields), a bite of 64 cells a side out of the ground; the "
-             "first beside triangles of the same ground",
-             {"bodies.1000", "tori.100", "collider.edit", "collider.main"}},
+             "1000 bodies on a terrain, a pile of 100 tori (fields), a bite of 64 cells a side out of the ground, "
+             "triangles of settled ground and what engines make of them; the first beside triangles of the same ground",
+             {"bodies.1000", "tori.100", "collider.edit", "collider.main", "mesh.region", "mesh.collider"}},
             [](BenchRun& run) {
                 bool standard = true;
                 for (const Backend& engine : backends()) {

@@ -16,31 +16,40 @@ using namespace field;
 
 constexpr float kLeastFraction = 1.0f / 256;  // of a lattice edge: vertices keep as far from its ends
 
-uint64_t checksum_of(const std::array<vec3, 3>& corners) {
-    // A triangle's first corner is the one with the least hash, so that it may be named from any of them.
-    std::array<uint64_t, 3> h;
-    for (size_t i = 0; i < 3; ++i) {
-        const float place[3] = {corners[i].x, corners[i].y, corners[i].z};
-        h[i] = hash64_of(std::span<const float>(place));
-    }
+// A triangle's first corner is the one with the least hash, so that it may be named from any of them.
+uint64_t checksum_of(std::array<uint64_t, 3> h) {
     std::rotate(h.begin(), std::min_element(h.begin(), h.end()), h.end());
     return hash_combine(hash_combine(h[0], h[1]), h[2]);
 }
 
-}  // namespace
-
-uint64_t checksum_of_triangles(const Mesh& mesh) {
-    uint64_t sum = 0;
-    for (size_t t = 0; t < mesh.triangles.size(); t += 3)
-        sum += checksum_of({mesh.positions[mesh.triangles[t]], mesh.positions[mesh.triangles[t + 1]],
-                            mesh.positions[mesh.triangles[t + 2]]});
-    return hash_combine(sum, mesh.vertex_count());
+uint64_t hash_of(vec3 v) {
+    const float place[3] = {v.x, v.y, v.z};
+    return hash64_of(std::span<const float>(place));
 }
 
-uint64_t smooth_mesh_by_voxel(const HostBricks& bricks) {
+uint64_t edge_name(int axis, const std::array<int, 3>& low_texel) {
+    uint64_t name = uint64_t(axis);
+    for (const int t : low_texel) name = name << 20 | uint64_t(uint32_t(t) & 0xfffffu);
+    return name;
+}
+
+// Of a vertex, which is that far from the ends of its edge.
+uint64_t edge_name(vec3 v, float voxel) {
+    int axis = 3;
+    std::array<int, 3> low;
+    for (int k = 0; k < 3; ++k) {
+        const double at = double((&v.x)[k]) / double(voxel), near = std::round(at);
+        const bool along = std::abs(at - near) > 0.5 * double(kLeastFraction);
+        if (along) axis = k;
+        low[size_t(k)] = int(along ? std::floor(at) : near);
+    }
+    return edge_name(axis, low);
+}
+
+// visit(brick, corners, names of their edges) for each triangle, each corner anew from its two texels.
+template <typename Visit>
+void each_triangle(const HostBricks& bricks, Visit&& visit) {
     const float h = bricks.field().grid().voxel_size;
-    uint64_t sum = 0;
-    std::vector<uint64_t> edges;
     for (const uint32_t slot : bricks.field().slots()) {
         const BrickRecord& record = bricks.field().records()[slot];
         for (int i = 0; i < 343; ++i) {
@@ -53,28 +62,68 @@ uint64_t smooth_mesh_by_voxel(const HostBricks& bricks) {
             }
             const CellTriangles& triangles = cell_tables().triangles[solid];
             std::array<vec3, 3> corners;
+            std::array<uint64_t, 3> names;
             for (int k = 0; k < 3 * triangles.count; ++k) {
                 // Edges are numbered as cell_cases.h says.
                 const int edge = triangles.edges[k], axis = edge / 4;
                 int corner[3] = {};
                 corner[axis == 0 ? 1 : 0] = edge & 1;
                 corner[axis == 2 ? 1 : 2] = edge >> 1 & 1;
-                const int texel[3] = {record.texel_x + voxel[0] + corner[0], record.texel_y + voxel[1] + corner[1],
-                                      record.texel_z + voxel[2] + corner[2]};
+                const std::array<int, 3> texel{record.texel_x + voxel[0] + corner[0],
+                                               record.texel_y + voxel[1] + corner[1],
+                                               record.texel_z + voxel[2] + corner[2]};
                 const int from = corner[0] | corner[1] << 1 | corner[2] << 2;
                 const float a = value[from], b = value[from | 1 << axis];
                 float at[3] = {float(texel[0]), float(texel[1]), float(texel[2])};
                 at[axis] += std::clamp(a / (a - b), kLeastFraction, 1 - kLeastFraction);
                 corners[size_t(k % 3)] = {at[0] * h, at[1] * h, at[2] * h};
-                uint64_t name = uint64_t(axis);
-                for (const int t : texel) name = name << 20 | uint64_t(uint32_t(t) & 0xfffffu);
-                edges.push_back(name);
-                if (k % 3 == 2) sum += checksum_of(corners);
+                names[size_t(k % 3)] = edge_name(axis, texel);
+                if (k % 3 == 2) visit(record, corners, names);
             }
         }
     }
+}
+
+}  // namespace
+
+uint64_t checksum_of_triangles(const Mesh& mesh) {
+    uint64_t sum = 0;
+    for (size_t t = 0; t < mesh.triangles.size(); t += 3) {
+        const auto corner = [&](size_t k) { return hash_of(mesh.positions[mesh.triangles[t + k]]); };
+        sum += checksum_of({corner(0), corner(1), corner(2)});
+    }
+    return hash_combine(sum, mesh.vertex_count());
+}
+
+uint64_t smooth_mesh_by_voxel(const HostBricks& bricks) {
+    uint64_t sum = 0;
+    std::vector<uint64_t> edges;
+    each_triangle(bricks,
+                  [&](const BrickRecord&, const std::array<vec3, 3>& corners, const std::array<uint64_t, 3>& names) {
+                      sum += checksum_of({hash_of(corners[0]), hash_of(corners[1]), hash_of(corners[2])});
+                      edges.insert(edges.end(), names.begin(), names.end());
+                  });
     std::sort(edges.begin(), edges.end());
     return hash_combine(sum, uint64_t(std::unique(edges.begin(), edges.end()) - edges.begin()));
+}
+
+uint64_t checksum_of_edges(std::span<const vec3> vertices, std::span<const uint32_t> indices, float voxel) {
+    uint64_t sum = 0;
+    for (size_t t = 0; t < indices.size(); t += 3) {
+        const auto corner = [&](size_t k) { return edge_name(vertices[indices[t + k]], voxel); };
+        sum += checksum_of({corner(0), corner(1), corner(2)});
+    }
+    return sum;
+}
+
+uint64_t edges_by_voxel(const HostBricks& bricks, const Box3& within) {
+    const float h = bricks.field().grid().voxel_size, half = 0.5f * float(kBrickVoxels);
+    uint64_t sum = 0;
+    each_triangle(bricks, [&](const BrickRecord& at, const std::array<vec3, 3>&, const std::array<uint64_t, 3>& names) {
+        const vec3 middle{float(at.texel_x) + half, float(at.texel_y) + half, float(at.texel_z) + half};
+        if (within.contains(middle * h)) sum += checksum_of(names);
+    });
+    return sum;
 }
 
 uint64_t checksum_of_bytes(const Mesh& mesh) {

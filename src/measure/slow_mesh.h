@@ -6,6 +6,7 @@
 #include "field/meshing.h"
 
 #include <cstdint>
+#include <span>
 
 namespace kiln::measure {
 
@@ -13,6 +14,11 @@ namespace kiln::measure {
 uint64_t checksum_of_triangles(const field::Mesh& mesh);
 /// The same of marching cubes voxel by voxel, each corner anew from its two texels, edges told apart by sorting them.
 uint64_t smooth_mesh_by_voxel(const field::HostBricks& bricks);
+
+/// Which lattice edges the corners of each triangle lie on, wherever on them; triangles in any order. `voxel`: metres.
+uint64_t checksum_of_edges(std::span<const vec3> vertices, std::span<const uint32_t> indices, float voxel);
+/// The same, voxel by voxel, of bricks whose middle lies in the box.
+uint64_t edges_by_voxel(const field::HostBricks& bricks, const Box3& within);
 
 /// Of every byte of a mesh.
 uint64_t checksum_of_bytes(const field::Mesh& mesh);

@@ -164,6 +164,8 @@ public:
     /// Of the point of a body that is at p_world now.
     vec3 velocity_at(BodyId id, vec3 p_world) const;
     Motion motion(BodyId id) const;
+    /// What this engine makes of meshed ground, on any thread.
+    virtual GroundMesher::Build region_builder() const = 0;
 
 protected:
     struct Body {
@@ -193,7 +195,6 @@ protected:
     virtual void guide(uint32_t index, vec3 linear, vec3 angular) = 0;
     virtual void swap(uint32_t index, std::shared_ptr<const SdfShape> field) = 0;
     virtual void advance(float seconds) = 0;
-    virtual GroundMesher::Build region_builder() const = 0;
     /// Pairs of bodies that touch now, in any order, with the lower index first.
     struct Pair {
         uint32_t a, b;

@@ -5,6 +5,7 @@
 #include "measure/recipes.h"
 #include "measure/slow.h"
 #include "measure/slow_mesh.h"
+#include "physics/physics.h"
 
 #include "sdf/eval.h"
 #include "sdf/expression.h"
@@ -228,13 +229,37 @@ TEST(Bench, TheSlowMeshSeesOneCornerThatMoved) {
     field::Mesh smooth, sharp, slow_way;
     field::mesh_smooth(bricks, smooth);
     EXPECT_EQ(checksum_of_triangles(smooth), smooth_mesh_by_voxel(host));
+    const auto edges = [&] {
+        return checksum_of_edges(smooth.positions.span(), smooth.triangles.span(), options.voxel_size);
+    };
+    const uint64_t named = edges_by_voxel(host, {{-2, -2, -2}, {2, 2, 2}});
+    EXPECT_EQ(edges(), named);
+    EXPECT_NE(edges(), edges_by_voxel(host, {{-2, -2, -2}, {2, 0.5f, 2}}));
     smooth.positions[7].y = std::nextafter(smooth.positions[7].y, 2.0f);
     EXPECT_NE(checksum_of_triangles(smooth), smooth_mesh_by_voxel(host));
+    smooth.positions[7].x += options.voxel_size;
+    EXPECT_NE(edges(), named);
     field::mesh_sharp(bricks, field::exact_of(host, bricks), sharp);
     field::mesh_sharp(bricks, every_edit(host, bricks, 1), slow_way);
     EXPECT_EQ(checksum_of_bytes(sharp), checksum_of_bytes(slow_way));
     std::swap(sharp.triangles[3], sharp.triangles[4]);
     EXPECT_NE(checksum_of_bytes(sharp), checksum_of_bytes(slow_way));
+}
+
+TEST(Bench, SettledGroundIsMeshedAsOneMeshOfTheWholeWouldBe) {
+    const std::vector<std::string> rows{"physics/mesh.region", "physics/mesh.collider"};
+    const auto report = run_bench(rows, small({0}));
+    ASSERT_TRUE(report) << report.error().message;
+    size_t engines = 0;
+    for (const physics::Backend& engine : physics::backends()) engines += engine.why_not.empty();
+    ASSERT_EQ(report->rows.size(), 1 + engines);
+    EXPECT_EQ(report->rows[0].name, "mesh.region");
+    for (const BenchRow& row : report->rows) {
+        EXPECT_EQ(row.unit, "Mtri/s") << row.name;
+        EXPECT_GT(row.value, 0) << row.name;
+        EXPECT_EQ(row.checksum, report->rows[0].checksum) << row.name;
+        EXPECT_EQ(row.peer.empty(), row.name == "mesh.region") << row.name;
+    }
 }
 
 TEST(BenchFrameGpu, EveryPassOfEverySizeIsARowAndPicturesAreTheSame) {
