@@ -39,6 +39,7 @@ const uint kMostBranches = 256u;
 const uint kMostLeaves = 64u;
 const uint kEnoughLeaves = 40u;  // of a chunk
 const uint kInLeaf = 4u;         // model::kMostInLeaf
+const uint kInNode = 4u;         // grandchildren; no fewer than kInLeaf
 
 shared Branch branches[kMostBranches];  // still to be opened
 shared uint branch_count;
@@ -121,13 +122,38 @@ void node_box(Branch b, out vec3 low, out vec3 high) {
     high = middle + half_size;
 }
 
-// Without kFrameAccelerate every branch is kept: the slow twin.
+// A leaf of a part goes to the chunk. Without kFrameAccelerate every branch is kept: the slow twin.
 void keep_branch(Branch b) {
     vec3 low;
     vec3 high;
     node_box(b, low, high);
     if ((frame.flags & kFrameAccelerate) != 0u && !may_meet(tile_beam, low, high)) return;
-    branches[atomicAdd(branch_count, 1u)] = b;
+    uint leaf = b.part == kTopTree ? 0u : nodes[mesh_parts[b.part].first_node + b.node].leaf;
+    if (leaf == 0u) {
+        branches[atomicAdd(branch_count, 1u)] = b;
+        return;
+    }
+    uint i = atomicAdd(leaf_count, 1u);
+    leaves[i] = uvec2(b.part, leaf);
+    leaf_triangles[i] = 0u;
+    if ((mesh_parts[b.part].flags & kMeshMask) != 0u) atomicOr(leaves_with_holes[i >> 5u], 1u << (i & 31u));
+    for (uint axis = 0u; axis < 3u; ++axis) {
+        leaf_boxes[6u * i + axis] = low[axis];
+        leaf_boxes[6u * i + 3u + axis] = high[axis];
+    }
+}
+
+// One of the four threads that open a branch, which is no leaf of a part: each has a part of a leaf of the parts' tree, or one of the node's
+// grandchildren; a child that is a leaf has none and stands for them. Trees are binary (model/bvh.h).
+void open_branch(Branch b, uint thread) {
+    uint first_node = b.part == kTopTree ? 0u : mesh_parts[b.part].first_node;
+    uint leaf = nodes[first_node + b.node].leaf;
+    uint child = thread < 2u ? b.node + 1u : nodes[first_node + b.node + 1u].skip;
+    bool second = (thread & 1u) != 0u;
+    bool ends = leaf == 0u && nodes[first_node + child].leaf != 0u;
+    uint grandchild = ends || leaf != 0u ? child : second ? nodes[first_node + child + 1u].skip : child + 1u;
+    if (leaf != 0u ? thread >= (leaf & 7u) : ends && second) return;
+    keep_branch(leaf != 0u ? Branch((leaf >> 3u) + thread, 0u) : Branch(b.part, grandchild));
 }
 
 // All threads of the workgroup come here, and to next_leaves().
@@ -170,43 +196,24 @@ void next_leaves() {
         tile_open = 0u;
     }
     barrier();
-    while (branch_count > 0u && leaf_count < kEnoughLeaves) {
+    do {
         uint count = branch_count;
-        // Each makes one leaf, or up to four branches. A list near its end is opened one by one from there, which lengthens it by no more than the
+        // Each makes up to four leaves or branches. A list near its end is opened one by one from there, which lengthens it by no more than the
         // depth of the trees.
-        uint opened = min(min(count, kMostLeaves - leaf_count), count < 189u ? (192u - count) / 3u : 1u);
-        Branch b = thread < opened ? branches[count - opened + thread] : Branch(0u, 0u);
+        uint opened = min(min(count, (kMostLeaves - leaf_count) / kInNode), count < 125u ? (128u - count) / 3u : 1u);
+        uint which = thread / kInNode;
+        Branch b = which < opened ? branches[count - opened + which] : Branch(0u, 0u);
         barrier();
         if (thread == 0u) branch_count = count - opened;
         barrier();
-        if (thread < opened) {
-            uint first_node = b.part == kTopTree ? 0u : mesh_parts[b.part].first_node;
-            uint leaf = nodes[first_node + b.node].leaf;
-            if (b.part != kTopTree && leaf != 0u) {
-                uint i = atomicAdd(leaf_count, 1u);
-                leaves[i] = uvec2(b.part, leaf);
-                leaf_triangles[i] = 0u;
-                if ((mesh_parts[b.part].flags & kMeshMask) != 0u) atomicOr(leaves_with_holes[i >> 5u], 1u << (i & 31u));
-                vec3 low;
-                vec3 high;
-                node_box(b, low, high);
-                for (uint axis = 0u; axis < 3u; ++axis) {
-                    leaf_boxes[6u * i + axis] = low[axis];
-                    leaf_boxes[6u * i + 3u + axis] = high[axis];
-                }
-            } else {
-                // The children of a node follow it; the parts of a leaf have trees of their own.
-                uint end = leaf != 0u ? (leaf >> 3u) + (leaf & 7u) : nodes[first_node + b.node].skip;
-                for (uint child = leaf != 0u ? leaf >> 3u : b.node + 1u; child < end;) {
-                    keep_branch(leaf != 0u ? Branch(child, 0u) : Branch(b.part, child));
-                    child = leaf != 0u ? child + 1u : nodes[first_node + child].skip;
-                }
-            }
-        }
+        if (which < opened) open_branch(b, thread % kInNode);
         barrier();
-    }
-    for (uint i = thread; i < kInLeaf * leaf_count; i += uint(kTileGroup * kTileGroup)) {
-        uvec2 leaf = leaves[i / kInLeaf];
+    } while (branch_count > 0u && leaf_count < kEnoughLeaves);
+    uint round = 0u;
+    do {
+        uint i = round + thread;
+        uvec2 leaf = i < kInLeaf * leaf_count ? leaves[i / kInLeaf] : uvec2(0u);
+        round += uint(kTileGroup * kTileGroup);
         if (i % kInLeaf >= (leaf.y & 7u)) continue;
         MeshPart part = mesh_parts[leaf.x];
         vec3 p[3];
@@ -216,6 +223,6 @@ void next_leaves() {
         }
         if ((frame.flags & kFrameAccelerate) == 0u || may_hide(part.flags, p[0], p[1], p[2]))
             atomicOr(leaf_triangles[i / kInLeaf], 1u << (i % kInLeaf));
-    }
+    } while (round < kInLeaf * leaf_count);
     barrier();
 }

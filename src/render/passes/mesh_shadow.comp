@@ -297,6 +297,18 @@ void cover_chunk(Disc disc, Reach cone, Reach middle) {
     if (kHoles) cover_leaves(disc, todo & with_holes, later & with_holes, true);
 }
 
+// The next light that some point of the workgroup sees something of and that has no map, of the channel before `next_channel`; kNoLight: none.
+uint next_wanted_light(inout LightWalk walk, inout uint next_channel) {
+    uint index = kNoLight;
+    bool found = false;
+    do {
+        index = next_channel < kLightsAtOnce ? next_light(walk) : kNoLight;
+        found = index == kNoLight || ((tile_wants >> next_channel) & 1u) != 0u && lights[index].color.w == 0.0;
+        ++next_channel;
+    } while (!found);
+    return index;
+}
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     bool in_tile = pixel.x < frame.tile_width && pixel.y < frame.tile_height;
@@ -317,10 +329,10 @@ void main() {
     }
     bound_tile(lit, from, fractions);
     LightWalk walk = light_walk(ivec2(gl_WorkGroupID.xy) * kTileGroup, push.first_light);
-    for (uint channel = 0u; channel < kLightsAtOnce; ++channel) {
-        uint index = next_light(walk);
-        if (index == kNoLight) break;
-        if ((tile_wants & (1u << channel)) == 0u || lights[index].color.w != 0.0) continue;  // maps have those
+    uint next_channel = 0u;
+    uint index = next_wanted_light(walk, next_channel);
+    if (index != kNoLight) do {
+        uint channel = next_channel - 1u;
         begin_light(lights[index]);
         float before = visible_fraction(fractions, channel);
         bool open = lit && before > 0.0;
@@ -335,8 +347,8 @@ void main() {
         for (uint i = 0u; i < kChords; ++i) covered[i] = 0u;
         full_chords = 0u;
         all_covered = false;
-        bool more = true;
-        while (more) {
+        bool more = false;
+        do {
             next_leaves();
             if (open && leaf_count != 0u) {
                 cover_chunk(disc, cone, middle);
@@ -349,12 +361,14 @@ void main() {
                 more = tile_open != 0u;
                 barrier();
             }
+        } while (more);
+        if (lit && before > 0.0) {
+            int hidden = 0;
+            for (uint i = 0u; i < kChords; ++i) hidden += bitCount(covered[i]);
+            float left = all_covered ? 0.0 : (hard ? 1.0 : 1.0 - float(hidden) / float(32u * kChords));
+            set_visible_fraction(fractions, channel, before * left);
         }
-        if (!lit || before <= 0.0) continue;
-        int hidden = 0;
-        for (uint i = 0u; i < kChords; ++i) hidden += bitCount(covered[i]);
-        float left = all_covered ? 0.0 : (hard ? 1.0 : 1.0 - float(hidden) / float(32u * kChords));
-        set_visible_fraction(fractions, channel, before * left);
-    }
+        index = next_wanted_light(walk, next_channel);
+    } while (index != kNoLight);
     if (in_tile) imageStore(visible_fractions, pixel, fractions);
 }
