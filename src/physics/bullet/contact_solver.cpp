@@ -2,6 +2,8 @@
 
 #include "physics/bullet/contact_solver.h"
 
+#include "physics/bullet/islands.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -21,8 +23,6 @@ constexpr float kPushedOut = 0.2f, kMovedOut = 0.4f;  // of the depth, a step
 using Quad = float __attribute__((vector_size(16)));
 Quad to_quad(const btVector3& v) { return Quad{v.x(), v.y(), v.z(), 0}; }
 btVector3 to_bullet(Quad q) { return {q[0], q[1], q[2]}; }
-
-bool stands(const btCollisionObject* o) { return o->isStaticOrKinematicObject(); }
 
 }  // namespace
 

@@ -9,7 +9,6 @@ namespace kiln::physics {
 
 namespace {
 
-bool stands(const btCollisionObject* o) { return o->isStaticOrKinematicObject(); }
 uint32_t index_of(const btCollisionObject* o) { return uint32_t(o->getUserIndex()); }
 
 }  // namespace

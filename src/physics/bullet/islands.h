@@ -11,6 +11,9 @@
 
 namespace kiln::physics {
 
+/// No contact moves it.
+inline bool stands(const btCollisionObject* o) { return o->isStaticOrKinematicObject(); }
+
 /// Of one world; its thread. Bodies have user indices of their own.
 class Islands {
 public:
