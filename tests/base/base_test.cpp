@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Assert, format, log, hash and profile.
 #include "base/assert.h"
 #include "base/hash.h"

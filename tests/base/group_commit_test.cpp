@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What a power cut leaves of a RecordFile, in a time that only the test moves: a millisecond is a step, and a sync takes as many as the test says.
 
 #include "base/record_file.h"

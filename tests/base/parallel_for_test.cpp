@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "base/parallel_for.h"
 
 #include <gtest/gtest.h>

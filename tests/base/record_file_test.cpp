@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "base/record_file.h"
 #include "temp_folder.h"
 

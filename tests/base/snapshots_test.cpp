@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What snapshots are made of: what one holder changes, another never sees.
 
 #include "base/append_array.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "field/brick_field.h"
 
 #include "base/parallel_for.h"

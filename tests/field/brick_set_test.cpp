@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "field/brick_set.h"
 
 #include "sdf/place.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What a clipmap counts, against counting its cells before and after.
 #include "clipmaps.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Clipmaps against the exact program: bounds, seams, rays, and places far out.
 #include "clipmaps.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // In which order a clipmap makes what is asked of it, what its seams do to normals, and long runs of what shorter tests prove.
 #include "clipmaps.h"
 

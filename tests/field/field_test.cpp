@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What the field says about a world, against asking the whole program at every texel of every cell.
 
 #include "field/field.h"

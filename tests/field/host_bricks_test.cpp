@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What the baked texels say, against the judge: the world's list walked in double precision, sharing nothing with the tape.
 
 #include "field/host_bricks.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "field/loose.h"
 
 #include "worlds.h"

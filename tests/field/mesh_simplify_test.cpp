@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "field/mesh_simplify.h"
 
 #include "field/meshing.h"

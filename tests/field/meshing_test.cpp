@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "field/meshing.h"
 
 #include "field/cell_cases.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Gate G1 on the CPU: the march's own text (march.gpu.h and cubic.gpu.h, the same that the shader compiles) against the reference.
 
 #include "field/reference_ray.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Words of a torus after any changes: never wrong, and exact when they are settled.
 #include "field/rough_cells.h"
 

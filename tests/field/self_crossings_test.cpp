@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Meshes never pass through themselves.
 #include "self_crossings.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Bricks that an update need not bake: none too many, and not so few that asking would be in vain.
 #include "field/host_bricks.h"
 

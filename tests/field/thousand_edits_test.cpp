@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // A thousand changes of a world and the undo of all of them: what is updated is, bit for bit, what is built from nothing.
 #include "field/field.h"
 #include "field/host_bricks.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Wide loops against one at a time: the same bits, from every instruction set, in both formats, for points and rays of all kinds.
 #include "field/wide.h"
 

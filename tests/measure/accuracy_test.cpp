@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // How true the bricks' answers are on the published scene, against the exact edits: what the scene says of the engine, not of the machine.
 #include "measure/recipes.h"
 

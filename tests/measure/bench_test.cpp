@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Benchmarks do the work they say: the scenes are those of the recipe, and every row's result is the slow way's.
 #include "measure/bench_run.h"
 #include "measure/letters.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // The nearest surface on the published scenes, against a reference of its own: every ball and box is cut into patches down to a micrometre, and
 // the nearest whose middle the closed-form fold has on the surface is the answer. It shares nothing with the search: it halves surfaces
 // where that halves space, and no program, pruning or region is in it.

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // A mesh as a shape: where its surface is, which side is inside, that it is 1-Lipschitz, and what is said of it.
 
 #include "meshes.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What Bullet itself does with a field: its rays, sweeps, continuous bodies and character, which know shapes as triangles only.
 #include "physics/bullet/sdf_algorithm.h"
 #include "physics/cell_triangles.h"

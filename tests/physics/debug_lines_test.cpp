@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "physics/debug_lines.h"
 
 #include "physics/worlds.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Ground that is dug away or built while bodies lie on it, on every engine that runs here.
 #include "physics/physics.h"
 #include "physics/sdf_collision.h"

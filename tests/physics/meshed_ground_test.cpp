@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Ground that is meshed by regions where it has settled, beside the field that it is meshed from.
 #include "physics/physics.h"
 #include "physics/worlds.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Longer motions whose end is known: a top, a bridge, a slide over hills, and piles that engines must agree on.
 #include "physics/physics.h"
 #include "physics/worlds.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What comes to rest, alone, in stacks and in piles, on every engine that runs here.
 #include "physics/physics.h"
 #include "physics/sdf_collision.h"

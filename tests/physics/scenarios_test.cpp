@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Bodies in motion, questions about them, and what is refused, on every engine that runs here.
 #include "physics/physics.h"
 #include "physics/sdf_collision.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "physics/sdf_collision.h"
 
 #include "physics/convex_field.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Bodies on inclines, where closed forms say what they do, on every engine that runs here.
 #include "physics/physics.h"
 #include "physics/sdf_collision.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Ground as triangles, beside the field that they are the surface of.
 #include "field/host_bricks.h"
 #include "field/meshing.h"

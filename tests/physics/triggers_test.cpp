@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "physics/triggers.h"
 #include "physics/worlds.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Gate G19 at the sizes that pictures have, not only at powers of two: the energy of a spark wherever it is, its glow while it moves by less than
 // a pixel, and the same picture at another resolution.
 #include "image/metrics.h"

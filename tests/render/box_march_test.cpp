@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // The march that meets cells in no order (box_march.gpu.h), on the CPU: of all cells with a box, taken backwards and one by one, it ends where
 // the walk does, bit for bit.
 #include "field/brick_walk.gpu.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Images of the sky: where their texels lie, and the light that they give, against sums over the sphere.
 
 #include "render/lib/environment_map.h"

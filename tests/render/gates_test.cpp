@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Gates of whole frames that no single pass has to itself: white furnaces, a sky at infinity, depth that is never copied.
 #include "drawables.h"
 #include "field/brick_set.h"

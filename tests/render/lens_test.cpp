@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Bloom, exposure and what they make of a picture: the host's way against closed forms (gate G19), the kernels against the host.
 #include "gpu_worlds.h"
 #include "render/lens.h"

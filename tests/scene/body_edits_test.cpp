@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Edits that are aimed at bodies, in flight and at rest, on every engine that runs here.
 #include "scene/simulation.h"
 

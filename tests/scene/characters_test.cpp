@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Characters of scenes, run: where they walk, for every engine that runs here.
 #include <kiln/world.h>
 

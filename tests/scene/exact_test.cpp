@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Exact queries against the judge, which prunes nothing.
 #include "scene/exact.h"
 

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "scene/journal.h"
 
 #include "field/clipmaps.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What a play has become, as a scene that goes on from there: poses and velocities of all that moves, on every engine that runs here.
 #include "scene/simulation.h"
 

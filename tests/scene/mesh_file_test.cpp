@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Worlds to meshes to files, read back by a reader that shares no code with the writers.
 #include "scene/mesh_file.h"
 

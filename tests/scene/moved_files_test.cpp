@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "scene/moved_files.h"
 
 #include "temp_folder.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Bodies and dynamic edits: seen and asked where they are, as the scene says they are seen, and moved without baking.
 #include "scene/box_cover.h"
 #include "field/brick_set.h"

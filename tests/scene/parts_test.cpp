@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What commands cut loose, as the world has it: in pictures, in questions, in the journal; on every engine that runs here.
 #include <kiln/world.h>
 

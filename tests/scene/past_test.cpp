@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Undo beyond saves, in the program that saved and in later ones.
 #include "scene/past.h"
 

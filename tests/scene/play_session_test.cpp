@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Plays of worlds that are being edited: what stopping, keeping and the end of the program leave.
 #include <kiln/world.h>
 

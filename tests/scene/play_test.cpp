@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Plays: what pictures of a scene see while its bodies run, on every engine that runs here.
 #include "physics/debug_lines.h"
 #include "scene/simulation.h"

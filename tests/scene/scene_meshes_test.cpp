@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Meshes of scenes: what a frame gets of them, and that one that cannot be read takes nothing with it.
 #include "model/drawable.h"
 #include "temp_folder.h"

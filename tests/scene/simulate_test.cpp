@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Scenes with bodies, run: what the JSON says, for every engine that runs here.
 #include <kiln/world.h>
 

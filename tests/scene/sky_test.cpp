@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // What lights a scene that says little: default sun and sky, and images of the sky.
 
 #include "image/exr_file.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 #include "scene/world_impl.h"
 
 #include "image/png_file.h"

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // Pictures of plane models against every operation at every pixel.
 
 #include "formulas.h"

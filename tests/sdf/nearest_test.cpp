@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+// Starts threads.
 // True distances against rays in all directions from the point, refined around the best: a reference that shares nothing with the
 // search but the judge's values, and can only be too far.
 #include "sdf/nearest.h"
