@@ -22,6 +22,8 @@ namespace {
 
 constexpr int kLoadRounds = 8;      // over the places a body lies on
 constexpr float kTouching = 5e-3f;  // metres apart that still counts as lying on something
+// Kilograms, and kilograms times square metres: engines reckon in floats, with these, one over these, and products of them with speeds.
+constexpr double kLeastMass = 1e-30, kMostMass = 1e30;
 
 bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 bool finite(const Pose& p) {
@@ -39,7 +41,7 @@ const Triangles* triangles_of(const BodyShape& s) {
     return t != nullptr ? t->get() : nullptr;
 }
 
-Error refused(const char* what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
+Error refused(std::string_view what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
 
 std::optional<Error> fault_of(const BodySettings& s) {
     if (!finite(s.pose)) return refused("a transform that is not finite; write finite numbers");
@@ -73,6 +75,11 @@ std::optional<Error> fault_of(const BodySettings& s) {
             return refused("no volume: every size must be a finite number above 0");
     }
     return std::nullopt;
+}
+
+bool reckonable(const MassProperties& m) {
+    const dvec3& i = m.moments;
+    return std::min({m.mass, i.x, i.y, i.z}) >= kLeastMass && std::max({m.mass, i.x, i.y, i.z}) <= kMostMass;
 }
 
 MassProperties mass_of(const BodySettings& s) {
@@ -114,6 +121,14 @@ Result<BodyId> World::add(const BodySettings& settings) {
         if (!mass) return mass.error();
         weighed = t->solid->with(*mass);
     }
+    BodySettings given = settings;
+    if (weighed != nullptr) given.shape = std::move(weighed);
+    MassProperties mass;
+    if (settings.motion != Motion::Static) mass = physics::mass_of(given);
+    if (settings.motion == Motion::Dynamic && !reckonable(mass))
+        return refused(
+            formatted("a mass of {} kg: it and the moments of inertia must be {} to {}; change its size or density",
+                      mass.mass, kLeastMass, kMostMass));
     if (count_ == kMostBodies)
         return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
     uint32_t index = uint32_t(bodies_.size());
@@ -124,15 +139,11 @@ Result<BodyId> World::add(const BodySettings& settings) {
         free_.pop_back();
     }
     Body& body = bodies_[index];
-    body.settings = settings;
-    if (weighed != nullptr) body.settings.shape = std::move(weighed);
-    body.mass = {};
+    body.settings = std::move(given);
+    body.mass = mass;
     body.body_from_mass = {};
-    if (settings.motion != Motion::Static) {
-        body.mass = physics::mass_of(body.settings);
-        body.body_from_mass = {body.mass.center, body.mass.axes};
-        if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
-    }
+    if (settings.motion != Motion::Static) body.body_from_mass = {mass.center, mass.axes};
+    if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     body.last = settings.pose * body.body_from_mass;
     body.support = {};
     if (settings.mesh_voxel > 0) {

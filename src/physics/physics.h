@@ -111,7 +111,8 @@ public:
     World& operator=(const World&) = delete;
     virtual std::string_view backend() const = 0;
 
-    /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move.
+    /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move, a mass
+    /// that no engine can reckon with.
     Result<BodyId> add(const BodySettings& settings);
     void remove(BodyId id);
     bool contains(BodyId id) const { return find(id) != nullptr; }
