@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace kiln::physics {
 
@@ -300,18 +301,20 @@ void World::resist_rolling(float seconds) {
     }
 }
 
+// Whether a body, or a material of it, resists rolling.
+bool World::resists_rolling(const Body& b) {
+    return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
+                                                          [](const Surface& s) { return s.rolling_friction > 0; });
+}
+
 // What holds each body up where rolling is resisted, and how hard it did so in this step. Of several places each counts by what it bears,
 // the loads along their normals that come nearest to what the body gained: a stone in a corner lies on the floor, whatever it touches of
 // the wall.
 void World::find_supports(float seconds) {
     for (Body& b : bodies_) b.support = {};
-    const auto rolls = [](const Body& b) {
-        return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
-                                                              [](const Surface& s) { return s.rolling_friction > 0; });
-    };
     places_.clear();
     for (const Pair& p : pairs_) {
-        if (p.depth < -kTouching || (!rolls(bodies_[p.a]) && !rolls(bodies_[p.b]))) continue;
+        if (p.depth < -kTouching || (!resists_rolling(bodies_[p.a]) && !resists_rolling(bodies_[p.b]))) continue;
         const float friction = of_pair(surface(p.a, p.point), surface(p.b, p.point)).rolling_friction;
         for (const bool first : {true, false})
             if (bodies_[first ? p.a : p.b].settings.motion == Motion::Dynamic)
@@ -362,7 +365,10 @@ void World::find_supports(float seconds) {
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
     mesh_ground(seconds);
-    resist_rolling(seconds);
+    const bool supports = std::exchange(
+        rolling_resisted_,
+        std::any_of(bodies_.begin(), bodies_.end(), [](const Body& b) { return b.live && resists_rolling(b); }));
+    if (rolling_resisted_) resist_rolling(seconds);
     advance(seconds);
     for (uint32_t i = 0; i < bodies_.size(); ++i) {
         if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;
@@ -386,11 +392,16 @@ void World::step(float seconds) {
     pairs_.clear();
     collect(pairs_);
     // To the last bit: engines tell them in any order, and sums and loads depend on it.
+    const auto whose = [](const Pair& p) { return uint64_t(p.a) << 32 | p.b; };
     const auto key = [](const Pair& p) {
-        return std::tuple(p.a, p.b, -p.depth, p.point.x, p.point.y, p.point.z, p.normal.x, p.normal.y, p.normal.z);
+        return std::tuple(-p.depth, p.point.x, p.point.y, p.point.z, p.normal.x, p.normal.y, p.normal.z);
     };
-    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& p, const Pair& q) { return key(p) < key(q); });
-    find_supports(seconds);
+    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& p, const Pair& q) {
+        return whose(p) != whose(q) ? whose(p) < whose(q) : key(p) < key(q);
+    });
+    if (rolling_resisted_) find_supports(seconds);
+    if (supports && !rolling_resisted_)
+        for (Body& b : bodies_) b.support = {};
     events_.clear();
     std::vector<Touch>& touches = touches_before_;  // what is of no more use
     touches.clear();

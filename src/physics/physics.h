@@ -209,6 +209,7 @@ protected:
 private:
     const MassProperties& mass_of(BodyId id) const;
     void mesh_ground(float seconds);
+    static bool resists_rolling(const Body& body);
     void resist_rolling(float seconds);
     void find_supports(float seconds);
     vec3 gravity_{};
@@ -230,6 +231,7 @@ private:
     std::vector<Place> places_;
     size_t count_ = 0;
     int lost_ = 0;
+    bool rolling_resisted_ = false;  // by something that was there in the last step
 };
 
 /// An engine that this build has; `why_not` says why this machine cannot run it, empty when it can.
