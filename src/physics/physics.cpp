@@ -15,6 +15,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace kiln::physics {
 
@@ -22,6 +23,8 @@ namespace {
 
 constexpr int kLoadRounds = 8;      // over the places a body lies on
 constexpr float kTouching = 5e-3f;  // metres apart that still counts as lying on something
+// Kilograms, and kilograms times square metres: engines reckon in floats, with these, one over these, and products of them with speeds.
+constexpr double kLeastMass = 1e-30, kMostMass = 1e30;
 
 bool finite(vec3 v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 bool finite(const Pose& p) {
@@ -39,7 +42,7 @@ const Triangles* triangles_of(const BodyShape& s) {
     return t != nullptr ? t->get() : nullptr;
 }
 
-Error refused(const char* what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
+Error refused(std::string_view what) { return {formatted("a body with {}", what), ErrorKind::Input}; }
 
 std::optional<Error> fault_of(const BodySettings& s) {
     if (!finite(s.pose)) return refused("a transform that is not finite; write finite numbers");
@@ -73,6 +76,11 @@ std::optional<Error> fault_of(const BodySettings& s) {
             return refused("no volume: every size must be a finite number above 0");
     }
     return std::nullopt;
+}
+
+bool reckonable(const MassProperties& m) {
+    const dvec3& i = m.moments;
+    return std::min({m.mass, i.x, i.y, i.z}) >= kLeastMass && std::max({m.mass, i.x, i.y, i.z}) <= kMostMass;
 }
 
 MassProperties mass_of(const BodySettings& s) {
@@ -114,6 +122,14 @@ Result<BodyId> World::add(const BodySettings& settings) {
         if (!mass) return mass.error();
         weighed = t->solid->with(*mass);
     }
+    BodySettings given = settings;
+    if (weighed != nullptr) given.shape = std::move(weighed);
+    MassProperties mass;
+    if (settings.motion != Motion::Static) mass = physics::mass_of(given);
+    if (settings.motion == Motion::Dynamic && !reckonable(mass))
+        return refused(
+            formatted("a mass of {} kg: it and the moments of inertia must be {} to {}; change its size or density",
+                      mass.mass, kLeastMass, kMostMass));
     if (count_ == kMostBodies)
         return Error{formatted("more than {} bodies; make do with fewer", kMostBodies), ErrorKind::Input};
     uint32_t index = uint32_t(bodies_.size());
@@ -124,15 +140,11 @@ Result<BodyId> World::add(const BodySettings& settings) {
         free_.pop_back();
     }
     Body& body = bodies_[index];
-    body.settings = settings;
-    if (weighed != nullptr) body.settings.shape = std::move(weighed);
-    body.mass = {};
+    body.settings = std::move(given);
+    body.mass = mass;
     body.body_from_mass = {};
-    if (settings.motion != Motion::Static) {
-        body.mass = physics::mass_of(body.settings);
-        body.body_from_mass = {body.mass.center, body.mass.axes};
-        if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
-    }
+    if (settings.motion != Motion::Static) body.body_from_mass = {mass.center, mass.axes};
+    if (settings.motion == Motion::Kinematic) body.mass.mass = 0;
     body.last = settings.pose * body.body_from_mass;
     body.support = {};
     if (settings.mesh_voxel > 0) {
@@ -289,18 +301,20 @@ void World::resist_rolling(float seconds) {
     }
 }
 
+// Whether a body, or a material of it, resists rolling.
+bool World::resists_rolling(const Body& b) {
+    return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
+                                                          [](const Surface& s) { return s.rolling_friction > 0; });
+}
+
 // What holds each body up where rolling is resisted, and how hard it did so in this step. Of several places each counts by what it bears,
 // the loads along their normals that come nearest to what the body gained: a stone in a corner lies on the floor, whatever it touches of
 // the wall.
 void World::find_supports(float seconds) {
     for (Body& b : bodies_) b.support = {};
-    const auto rolls = [](const Body& b) {
-        return b.settings.rolling_friction > 0 || std::any_of(b.settings.surfaces.begin(), b.settings.surfaces.end(),
-                                                              [](const Surface& s) { return s.rolling_friction > 0; });
-    };
     places_.clear();
     for (const Pair& p : pairs_) {
-        if (p.depth < -kTouching || (!rolls(bodies_[p.a]) && !rolls(bodies_[p.b]))) continue;
+        if (p.depth < -kTouching || (!resists_rolling(bodies_[p.a]) && !resists_rolling(bodies_[p.b]))) continue;
         const float friction = of_pair(surface(p.a, p.point), surface(p.b, p.point)).rolling_friction;
         for (const bool first : {true, false})
             if (bodies_[first ? p.a : p.b].settings.motion == Motion::Dynamic)
@@ -351,7 +365,10 @@ void World::find_supports(float seconds) {
 void World::step(float seconds) {
     KILN_ASSERT(seconds > 0 && std::isfinite(seconds), "a step of {} s", double(seconds));
     mesh_ground(seconds);
-    resist_rolling(seconds);
+    const bool supports = std::exchange(
+        rolling_resisted_,
+        std::any_of(bodies_.begin(), bodies_.end(), [](const Body& b) { return b.live && resists_rolling(b); }));
+    if (rolling_resisted_) resist_rolling(seconds);
     advance(seconds);
     for (uint32_t i = 0; i < bodies_.size(); ++i) {
         if (!bodies_[i].live || bodies_[i].settings.motion != Motion::Dynamic) continue;
@@ -375,11 +392,16 @@ void World::step(float seconds) {
     pairs_.clear();
     collect(pairs_);
     // To the last bit: engines tell them in any order, and sums and loads depend on it.
+    const auto whose = [](const Pair& p) { return uint64_t(p.a) << 32 | p.b; };
     const auto key = [](const Pair& p) {
-        return std::tuple(p.a, p.b, -p.depth, p.point.x, p.point.y, p.point.z, p.normal.x, p.normal.y, p.normal.z);
+        return std::tuple(-p.depth, p.point.x, p.point.y, p.point.z, p.normal.x, p.normal.y, p.normal.z);
     };
-    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& p, const Pair& q) { return key(p) < key(q); });
-    find_supports(seconds);
+    std::sort(pairs_.begin(), pairs_.end(), [&](const Pair& p, const Pair& q) {
+        return whose(p) != whose(q) ? whose(p) < whose(q) : key(p) < key(q);
+    });
+    if (rolling_resisted_) find_supports(seconds);
+    if (supports && !rolling_resisted_)
+        for (Body& b : bodies_) b.support = {};
     events_.clear();
     std::vector<Touch>& touches = touches_before_;  // what is of no more use
     touches.clear();

@@ -111,7 +111,8 @@ public:
     World& operator=(const World&) = delete;
     virtual std::string_view backend() const = 0;
 
-    /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move.
+    /// Refused, with the reason: one more than kMostBodies, no volume, numbers that are not finite, a field without end that is to move, a mass
+    /// that no engine can reckon with.
     Result<BodyId> add(const BodySettings& settings);
     void remove(BodyId id);
     bool contains(BodyId id) const { return find(id) != nullptr; }
@@ -208,6 +209,7 @@ protected:
 private:
     const MassProperties& mass_of(BodyId id) const;
     void mesh_ground(float seconds);
+    static bool resists_rolling(const Body& body);
     void resist_rolling(float seconds);
     void find_supports(float seconds);
     vec3 gravity_{};
@@ -229,6 +231,7 @@ private:
     std::vector<Place> places_;
     size_t count_ = 0;
     int lost_ = 0;
+    bool rolling_resisted_ = false;  // by something that was there in the last step
 };
 
 /// An engine that this build has; `why_not` says why this machine cannot run it, empty when it can.

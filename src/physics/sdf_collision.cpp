@@ -34,10 +34,13 @@ struct Probe {
     vec3 normal;  // unit
 };
 
+// Whether a gradient of this length tells a direction.
+bool tells_way(float slope) { return slope > 1e-4f && slope < std::numeric_limits<float>::infinity(); }
+
 // From a distance and a gradient. `otherwise` is the normal where there is none.
 Probe probe(vec3 p, float d, vec3 g, vec3 otherwise) {
     const float slope = length(g);
-    if (!(slope > 1e-4f)) return {p, -d, otherwise};
+    if (!tells_way(slope)) return {p, -d, otherwise};
     return {p, -d / std::max(slope, kLeastSlope), g / slope};
 }
 
@@ -346,19 +349,24 @@ void find_seeds(const SdfShape& shell, const SdfShape& other, const Pose& other_
 }
 
 // One that is in the other with its middle may have surface on all sides that is pushed out, each its own way, and would be held there. Then
-// it goes out whole, the way its middle does.
+// it goes out whole, the way its middle does. So do two that move and cross each other (rods, an arm through an arm): away from each other.
 void push_out_whole(const SdfShape& a, const SdfShape& b, const Pose& b_from_a, std::vector<FieldContact>& contacts) {
     vec3 middle = b_from_a * a.mass().center, way;
     if (b.field().distance(middle, way) > 0) {
         if (!b.moves()) return;
+        const vec3 of_a = middle;
         middle = b.mass().center;
-        if (a.field().distance(inverse(b_from_a) * middle, way) > 0) return;
-        way = -rotate(b_from_a.rotation, way);
+        if (a.field().distance(inverse(b_from_a) * middle, way) > 0) {
+            way = of_a - middle;
+            middle = contacts.front().point;
+        } else {
+            way = -rotate(b_from_a.rotation, way);
+        }
     }
     const float slope = length(way);
     const bool agree =
         std::all_of(contacts.begin(), contacts.end(), [&](const FieldContact& c) { return dot(c.normal, way) > 0; });
-    if (slope > 1e-4f && !agree) contacts.assign(1, {middle, way / slope, kMostDepth});
+    if (tells_way(slope) && !agree) contacts.assign(1, {middle, way / slope, kMostDepth});
 }
 
 }  // namespace
@@ -469,7 +477,7 @@ std::optional<FieldHit> cast_ray(const field::SdfField& field, vec3 origin, vec3
             vec3 n;
             (void)field.distance(p, n);
             const float slope = length(n);
-            return FieldHit{f, p, slope > 1e-4f ? n / slope : way * (-1 / size)};
+            return FieldHit{f, p, tells_way(slope) ? n / slope : way * (-1 / size)};
         }
         f += d / size;
     }

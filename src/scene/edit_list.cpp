@@ -9,6 +9,25 @@
 
 namespace kiln::scene {
 
+EditList EditList::copy() const {
+    EditList out;
+    out.slots_.resize(slots_.size());
+    out.names_.reserve(size_);
+    for (uint32_t i = 0; i < slots_.size(); ++i) {
+        const Slot& s = slots_[i];
+        out.slots_[i] = {s.edit ? std::make_unique<Edit>(*s.edit) : nullptr,
+                         s.previous,
+                         s.next,
+                         s.generation,
+                         s.next_generation,
+                         s.row,
+                         s.place};
+        if (s.edit) out.names_.emplace(out.slots_[i].edit->name, i);
+    }
+    out.first_ = first_, out.last_ = last_, out.free_ = free_, out.size_ = size_, out.outlined_ = outlined_;
+    return out;
+}
+
 EditId EditList::free_id() const {
     if (free_ == kNone) return {uint32_t(slots_.size()), 0};
     return {free_, slots_[free_].next_generation};

@@ -29,6 +29,12 @@ public:
         JsonIndex place = UINT32_MAX;             ///< in the scene's source
     };
 
+    EditList() = default;
+    EditList(EditList&&) = default;
+    EditList& operator=(EditList&&) = default;
+    /// The same edits under the same ids.
+    EditList copy() const;
+
     uint32_t size() const { return size_; }
     uint32_t outlined() const { return outlined_; }  ///< edits with an outline
     uint32_t first() const { return first_; }

@@ -33,10 +33,6 @@ public:
     /// `first_line`: where the text begins in its file.
     static Result<JsonDocument> parse(std::string text, std::string name, uint32_t first_line = 1);
 
-    JsonDocument() = default;
-    JsonDocument(JsonDocument&&) = default;
-    JsonDocument& operator=(JsonDocument&&) = default;
-
     bool empty() const { return nodes_.empty(); }
     const std::string& name() const { return name_; }
     JsonType type(JsonIndex i) const { return nodes_[i].type; }

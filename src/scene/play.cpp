@@ -145,11 +145,7 @@ Result<Play> Play::start(const World& world, const SimulateSettings& settings) {
 }
 
 Result<Play> Play::begin(World& world, const SimulateSettings& settings) {
-    const scene::SceneData& data = world.impl_->data;
-    // Bundled models are known by the scene's name.
-    auto copy = World::parse(world.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
-    if (!copy) return copy.error();
-    auto session = std::make_unique<Session>(world, std::move(*copy));
+    auto session = std::make_unique<Session>(world, World::Impl::copy_of(world));
     auto made = scene::Simulation::make(session->start, settings);
     if (!made) {
         session->open = false;

@@ -264,16 +264,15 @@ Result<void> Simulation::add_triggers() {
 
 Result<World*> Simulation::live() {
     if (!live_) {
-        const SceneData& data = start_.impl_->data;
-        // Bundled models are known by the scene's name.
-        auto copy = World::parse(start_.to_json(), data.source.empty() ? data.folder + "scene" : data.source.name());
-        if (!copy) return copy.error();
-        live_ = std::move(*copy);
+        live_ = World::Impl::copy_of(start_);
         // What moves does not change what the field covers, nor how finely.
         if (live_->field_settings.levels == 1) {
-            const auto r = live_->impl_->resolution(live_->impl_->list, live_->field_settings);
+            World::Impl& impl = *live_->impl_;
+            const bool same = impl.built_with == live_->field_settings;
+            const auto r = impl.resolution(impl.list, live_->field_settings);
             live_->field_settings.voxel_size = r.voxel_size;
             live_->field_settings.bounds = r.bounds;
+            if (same) impl.built_with = live_->field_settings;  // it says the same
         }
         if (auto done = show_characters(); !done) return done.error();
         (void)live_->history();  // from here on

@@ -7,6 +7,7 @@
 
 #include "sdf/tables.h"
 
+#include "base/assert.h"
 #include "base/format.h"
 
 #include <algorithm>
@@ -49,6 +50,50 @@ Result<void> World::Impl::get_ready(World& world) {
     meshes = scene::load_meshes(data);
     if (!world.environment || world.environment->file.empty()) return {};
     return read_sky(world.environment->file);
+}
+
+World World::Impl::copy_of(const World& of) {
+    World out;
+    out.field_settings = of.field_settings;
+    out.lights = of.lights;
+    out.environment = of.environment;
+    out.cameras = of.cameras;
+    Impl& to = *out.impl_;
+    Impl& from = *of.impl_;
+    to.data = from.data;
+    to.edits = from.edits.copy();
+    to.names_given = from.names_given;
+    to.list = from.list;
+    to.grids = from.grids;
+    to.meshes = from.meshes;
+    to.generations = from.generations;
+    to.mover_of = from.mover_of;
+    to.all_is_new = true;
+    {
+        const std::lock_guard lock(from.mutex);
+        to.program = from.program;
+        to.all = from.all;
+        to.asked = from.asked;
+        to.built = from.built;
+        to.built_with = from.built_with;
+        to.built_apart = from.built_apart;
+        to.changes = from.changes;
+        to.inserted_since = from.inserted_since;
+        to.bricks = from.bricks;
+        to.levels = from.levels;
+        to.levels_with = from.levels_with;
+        to.levels_apart = from.levels_apart;
+        to.level_changes = from.level_changes;
+        to.movers = from.movers;
+        to.brick_sets = from.brick_sets;
+        to.sky_image = from.sky_image;
+    }
+    for (auto& [key, m] : to.movers) {
+        m.pose = m.before = scene::frame_of(*to.edits[key].edit);
+        const auto settled = to.settle_mover(m);
+        KILN_ASSERT(bool(settled), "a row that was compiled compiles no more");
+    }
+    return out;
 }
 
 std::string World::to_json() const { return impl_->json(*this); }

@@ -90,6 +90,10 @@ struct World::Impl {
     bool compile_later = false;
     bool group_left_open = false;  ///< by the journal that was read
 
+    /// A world that is what another one is, under the same ids and rows, with what was made of it so far (its field, its bricks): nothing is
+    /// read, compiled or baked again. It has no journal, no history and was never drawn; dynamic edits are where the list has them.
+    static World copy_of(const World& of);
+
     // Files (world_files.cpp).
     Result<void> read(World& world, std::string text, const std::string& name);
     Result<void> get_ready(World& world);

@@ -177,6 +177,25 @@ TEST_P(AtRest, FiveFieldToriStack) {
     }
 }
 
+TEST_P(AtRest, RodsThatBeginAcrossEachOtherComeApart) {
+    // Neither has its middle in the other, and what each has on the other's two sides is pushed both ways.
+    const auto rod = moving({edit(kiln::Capsule{.half_height = 0.5f, .radius = 0.3f})});
+    for (const float off : {0.35f, 0.55f}) {
+        Scene s(GetParam());
+        s.ground({edit(Plane{})}, 1);
+        const BodyId low = s.add({.shape = rod, .pose = {{0, 0.3f, 0}, axis_angle({1, 0, 0}, kPi / 2)}}),
+                     high = s.add({.shape = rod, .pose = {{off, 0.35f, 0.35f}, axis_angle({0, 0, 1}, kPi / 2)}});
+        float fastest = 0;
+        for (int i = 0; i < 240; ++i) {
+            s.world->step(kStep);
+            for (const BodyId id : {low, high}) fastest = std::max(fastest, length(s.world->state(id).linear_velocity));
+        }
+        EXPECT_LT(s.deepest(), 0.02f) << off;
+        EXPECT_LT(fastest, 6) << off << ": without a shot";
+        EXPECT_EQ(s.world->lost(), 0);
+    }
+}
+
 // What comes to rest on its own does so at one place on every engine.
 TEST(EnginesAgree, OnRestAndOnTheSlope) {
     const std::vector<std::string> all = engines();
@@ -186,15 +205,17 @@ TEST(EnginesAgree, OnRestAndOnTheSlope) {
         rests.emplace_back();
         speeds.emplace_back();
         for (const bool as_field : {false, true}) {
-            for (const Solid& solid : {solids()[0], solids()[1], solids()[3]}) {
+            for (const Solid& solid : solids()) {
                 Scene s(engine);
                 s.ground({edit(Plane{}), edit(kiln::Box{.half_extents = {2, 0.5f, 2}})});
-                const BodyId id =
-                    s.add({.shape = as_field ? solid.field() : solid.exact(), .pose = {{0.2f, 1.1f, 0.1f}, {}}});
+                // A ball has no one place on a plane, nor has a capsule, which lies, across its length.
+                const bool lies = solid.convex.kind == Convex::Kind::Capsule;
+                const BodyId id = s.add({.shape = as_field ? solid.field() : solid.exact(),
+                                         .pose = {{0.2f, 1.1f, 0.1f}, lies ? axis_angle({1, 0, 0}, kPi / 2) : quat{}}});
                 s.run(4);
-                // A ball has no one place on a plane.
                 vec3 rest = s.world->state(id).pose.position;
-                if (solid.convex.kind == Convex::Kind::Sphere) rest.x = rest.z = 0;
+                if (lies || solid.convex.kind == Convex::Kind::Sphere) rest.x = 0;
+                if (solid.convex.kind == Convex::Kind::Sphere) rest.z = 0;
                 rests.back().push_back(rest);
             }
         }
@@ -261,6 +282,40 @@ TEST_P(AtRest, RingsThatTumbleAreHeldWhereverTheyTouchTheGround) {
     }
     EXPECT_GT(deepest, 0);
     EXPECT_LT(deepest, 0.02f);
+}
+
+// As `bench physics/bodies.1000` has it, and a quarter of them as fields.
+struct SlowTerrain : Engines {};
+KILN_EACH_ENGINE(SlowTerrain);
+
+TEST_P(SlowTerrain, AThousandMixedBodiesNeverFallThrough) {
+    for (const bool as_field : {false, true}) {
+        Scene s(GetParam());
+        std::mt19937 rng(5);
+        const auto uniform = [&](float a, float b) { return std::uniform_real_distribution<float>(a, b)(rng); };
+        std::vector<Edit> edits{edit(Plane{})};
+        for (int i = 0; i < 200; ++i) {
+            const float radius = uniform(4, 10), rise = uniform(0.3f, 1.5f), x = uniform(-32, 32), z = uniform(-32, 32);
+            const bool hollow = i % 3 == 0;
+            edits.push_back(edit(kiln::Sphere{.radius = radius}, {x, hollow ? radius - rise : rise - radius, z},
+                                 hollow ? Op::Subtract : Op::Union, 1));
+        }
+        s.ground(edits);
+        const auto exact = field_of(edits);
+        std::vector<BodyShape> shapes;
+        for (const Solid& kind : solids()) shapes.push_back(as_field ? kind.field() : kind.exact());
+        std::vector<BodyId> ids;
+        const float half = as_field ? 13 : 27;
+        for (size_t i = 0; i < (as_field ? 250u : 1000u); ++i)
+            ids.push_back(s.add({.shape = shapes[i % 4],
+                                 .pose = {{uniform(-half, half), uniform(3, 5), uniform(-half, half)},
+                                          axis_angle({0, 0, 1}, uniform(0, 3))}}));
+        s.run(4);
+        for (size_t i = 0; i < ids.size(); ++i)
+            EXPECT_GT(exact->distance(s.world->state(ids[i]).pose.position), 0) << i << as_field;
+        EXPECT_LT(s.deepest(), 0.05f) << as_field;
+        EXPECT_EQ(s.world->lost(), 0) << as_field;
+    }
 }
 
 // As `bench physics/tori.100` has it, at every moment of its fall and after.

@@ -20,18 +20,20 @@ namespace {
 struct EachEngine : Engines {};
 KILN_EACH_ENGINE(EachEngine);
 
-TEST_P(EachEngine, ABulletStopsAtAThinWallAtAThousandMetresASecond) {
-    for (const float speed : {50.0f, 200.0f, 1000.0f, -1000.0f}) {  // below 0: as a field
-        Scene s(GetParam(), {0, 0, 0});
-        s.ground({edit(kiln::Box{.half_extents = {0.05f, 5, 5}})});
-        const BodyId id = s.add({.shape = speed > 0 ? BodyShape(Convex::sphere(0.05f))
-                                                    : BodyShape(moving({edit(kiln::Sphere{.radius = 0.05f})})),
-                                 .pose = {{-7.3f, 0.2f, 0.1f}, {}},
-                                 .continuous = true,
-                                 .linear_velocity = {std::abs(speed), 0, 0}});
-        s.run(0.5f);
-        const BodyState state = s.world->state(id);
-        EXPECT_NEAR(state.pose.position.x, -0.1f, 0.02f) << speed;
+TEST_P(EachEngine, ABulletStopsAtAThinWallUpToAThousandMetresASecond) {
+    for (const bool as_field : {false, true}) {
+        for (const float speed : {50.0f, 200.0f, 1000.0f}) {
+            Scene s(GetParam(), {0, 0, 0});
+            s.ground({edit(kiln::Box{.half_extents = {0.05f, 5, 5}})});
+            const BodyId id = s.add({.shape = as_field ? BodyShape(moving({edit(kiln::Sphere{.radius = 0.05f})}))
+                                                       : BodyShape(Convex::sphere(0.05f)),
+                                     .pose = {{-7.3f, 0.2f, 0.1f}, {}},
+                                     .continuous = true,
+                                     .linear_velocity = {speed, 0, 0}});
+            s.run(0.5f);
+            const BodyState state = s.world->state(id);
+            EXPECT_NEAR(state.pose.position.x, -0.1f, 0.02f) << speed << as_field;
+        }
     }
 }
 
@@ -101,6 +103,8 @@ TEST_P(EachEngine, QuestionsSeeConvexBodiesAndFields) {
     EXPECT_EQ(ball->body, ring);
     EXPECT_THAT(s.world->overlap(Convex::sphere(0.3f), {{4, 1.2f, 0}, {}}), testing::ElementsAre(box));
     EXPECT_THAT(s.world->overlap(Convex::sphere(0.3f), {{-4, 2, 0}, {}}), testing::IsEmpty());
+    EXPECT_THAT(s.world->overlap(Convex::box({0.3f, 0.3f, 0.3f}), {{-5, 2.4f, 0}, {}}), testing::ElementsAre(ring));
+    EXPECT_THAT(s.world->overlap(Convex::capsule(1, 0.3f), {{3.3f, 1.2f, 0}, {}}), testing::ElementsAre(ground, box));
 }
 
 TEST_P(EachEngine, BadBodiesAreRefusedAndNoneStopsTheWorld) {
@@ -122,6 +126,9 @@ TEST_P(EachEngine, BadBodiesAreRefusedAndNoneStopsTheWorld) {
     bad.density = 0, refused("density");
     bad.linear_velocity.y = std::numeric_limits<float>::infinity(), refused("velocity");
     bad.shape = SdfShape::fixed(field_of({edit(Plane{})})), refused("cannot move");
+    bad.density = 3e38f, bad.shape = Convex::sphere(10), refused("a mass of");
+    bad.density = 1e-36f, refused("a mass of");
+    bad.shape = Convex::sphere(1e-12f), refused("a mass of");
     const BodyId id = s.add(good);
     // One deep inside the ground is brought out without a shot.
     const BodyId buried = s.add({.pose = {{5, -0.4f, 0}, {}}});
@@ -139,23 +146,106 @@ TEST_P(EachEngine, BadBodiesAreRefusedAndNoneStopsTheWorld) {
 TEST_P(EachEngine, ABodyWhoseStateIsNotFiniteGoesBackAndRestsAndTheOthersGoOn) {
     Scene s(GetParam());
     s.ground({edit(Plane{})});
-    const BodyId id = s.add({.pose = {{0, 2, 0}, {}}}), other = s.add({.pose = {{5, 2, 0}, {}}});
-    s.run(0.2f);
-    const vec3 before = s.world->state(id).pose.position;
-    // Finite, so it is taken; its square is not.
-    s.world->set_velocity(id, {0, 0, 0}, {0, 3e38f, 0});
-    s.world->set_velocity(id, {3e38f, 3e38f, 0}, {0, 3e38f, 0});
-    s.world->step(kStep);
-    const BodyState state = s.world->state(id);
-    for (const float v : {state.pose.position.x, state.pose.position.y, state.pose.rotation.w, state.linear_velocity.x,
-                          state.angular_velocity.y})
-        EXPECT_TRUE(std::isfinite(v));
-    if (s.world->lost() > 0) {
-        EXPECT_LT(length(state.pose.position - before), 0.1f);
+    // Of finite numbers whose product is none: it bounces faster than a float can tell.
+    const BodyId id = s.add({.pose = {{0, 2, 0}, {}}, .restitution = 3e38f}), other = s.add({.pose = {{5, 2, 0}, {}}});
+    vec3 before = s.world->state(id).pose.position;
+    for (int i = 0; i < 60 && s.world->lost() == 0; ++i) {
+        before = s.world->state(id).pose.position;
+        s.world->step(kStep);
     }
-    s.run(4);
+    ASSERT_EQ(s.world->lost(), 1);
+    const BodyState state = s.world->state(id);
+    EXPECT_LT(length(state.pose.position - before), 1e-6f);
+    EXPECT_EQ(state.pose.rotation, quat());
+    EXPECT_EQ(state.linear_velocity, vec3());
+    EXPECT_EQ(state.angular_velocity, vec3());
+    // Nor is it gone: it falls from there, and bounces again.
+    s.run(3);
+    EXPECT_GT(s.world->lost(), 1);
+    EXPECT_NEAR(s.world->state(id).pose.position.y, 0.5f, 0.1f);
     EXPECT_NEAR(s.world->state(other).pose.position.y, 0.5f, 0.02f);
     EXPECT_TRUE(s.world->state(other).asleep);
+    // Faster than anything, and finite all the same.
+    s.world->set_velocity(id, {3e38f, 3e38f, 0}, {0, 3e38f, 0});
+    for (int i = 0; i < 240; ++i) {
+        s.world->step(kStep);
+        const BodyState now = s.world->state(id);
+        for (const float v : {now.pose.position.x, now.pose.position.y, now.pose.rotation.w, now.linear_velocity.x,
+                              now.angular_velocity.y})
+            ASSERT_TRUE(std::isfinite(v)) << i;
+    }
+    EXPECT_NEAR(s.world->state(other).pose.position.y, 0.5f, 0.02f);
+}
+
+struct SlowEngine : Engines {};
+KILN_EACH_ENGINE(SlowEngine);
+
+TEST_P(SlowEngine, OneBodyMoreThanThereMayBeIsRefusedAndTheOthersGoOn) {
+    Scene s(GetParam());
+    s.ground({edit(Plane{})});
+    const auto place = [](uint32_t i) { return Pose{{2 * float(i % 256), 0.5f, 2 * float(i / 256)}, {}}; };
+    std::vector<BodyId> ids;
+    for (uint32_t i = 1; i < World::kMostBodies; ++i) ids.push_back(s.add({.pose = place(i)}));
+    EXPECT_EQ(s.world->body_count(), World::kMostBodies);
+    const auto refused = s.world->add({.pose = place(0)});
+    ASSERT_FALSE(refused);
+    EXPECT_THAT(refused.error().message, testing::HasSubstr("more than 65536 bodies"));
+    s.world->step(kStep);
+    for (const uint32_t i : {0u, 1000u, World::kMostBodies - 2})
+        EXPECT_NEAR(s.world->state(ids[i]).pose.position.y, 0.5f, 0.01f) << i;
+    s.world->remove(ids[1000]);
+    EXPECT_TRUE(s.world->add({.pose = place(1001)}));
+    EXPECT_EQ(s.world->lost(), 0);
+}
+
+// A plane that in places is no number at all.
+class Torn final : public field::SdfField {
+public:
+    explicit Torn(float value) : value_(value) {}
+    float distance(vec3 p) const override { return p.x > 3 ? value_ : p.y; }
+    float distance(vec3 p, vec3& gradient) const override {
+        gradient = p.x > 3 ? vec3{value_, value_, value_} : vec3{0, 1, 0};
+        return distance(p);
+    }
+    void distances(const sdf::Points& points, float* out) const override {
+        for (int i = 0; i < points.count; ++i) out[i] = distance({points.x[i], points.y[i], points.z[i]});
+    }
+    Box3 bounds() const override { return {{-100, -100, -100}, {100, 0, 100}}; }
+
+private:
+    float value_;
+};
+
+TEST_P(EachEngine, GroundThatIsNoNumberSpoilsNobodysState) {
+    for (const float value : {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(),
+                              -std::numeric_limits<float>::infinity()}) {
+        for (const bool bricks : {false, true}) {
+            Scene s(GetParam());
+            const auto torn = std::make_shared<Torn>(value);
+            s.add({.shape = bricks ? SdfShape::fixed(
+                                         torn, std::make_shared<field::BrickField>(
+                                                   torn, field::BrickFieldOptions{.voxel_size = kVoxel, .near = 0.5f}))
+                                   : SdfShape::fixed(torn),
+                   .motion = Motion::Static});
+            std::vector<BodyId> ids;
+            for (const float x : {0.0f, 2.9f, 6.0f})
+                for (const Solid& solid : solids())
+                    for (const bool as_field : {false, true})
+                        ids.push_back(s.add({.shape = as_field ? solid.field() : solid.exact(),
+                                             .pose = {{x, 1, 3 * float(ids.size() % 8)}, {}}}));
+            for (int i = 0; i < 90; ++i) s.world->step(kStep);
+            for (size_t i = 0; i < ids.size(); ++i) {
+                const BodyState state = s.world->state(ids[i]);
+                for (const float v : {state.pose.position.x, state.pose.position.y, state.pose.position.z,
+                                      state.pose.rotation.w, state.linear_velocity.y, state.angular_velocity.x})
+                    EXPECT_TRUE(std::isfinite(v)) << i << " " << value << bricks;
+                if (i < 8) {
+                    EXPECT_NEAR(state.pose.position.y, 0.5f, 0.35f) << i << " " << value << bricks;
+                }
+            }
+            EXPECT_EQ(s.world->lost(), 0) << value << bricks;
+        }
+    }
 }
 
 TEST_P(EachEngine, TheSameStepsGiveTheSameBytesForAnyNumberOfThreads) {

@@ -212,4 +212,37 @@ TEST_P(OnSlopes, AFrictionlessBallInABowlKeepsItsEnergy) {
     }
 }
 
+TEST_P(OnSlopes, AFrictionlessBallInARingsTroughKeepsItsEnergy) {
+    // The lower half of a hollow ring, R 4 and r 2: the ball swings across the tube while it goes round.
+    for (const bool as_field : {false, true}) {
+        for (const int part : {1, 4}) {
+            Scene b(GetParam());
+            b.ground(ring_trough(), 0);
+            const float r = 0.3f, arm = 2 - r, angle = 0.4f;
+            const BodyId id =
+                b.add({.shape = as_field ? BodyShape(moving({edit(kiln::Sphere{.radius = r})})) : Convex::sphere(r),
+                       .pose = {{4 + arm * std::sin(angle), -arm * std::cos(angle), 0}, {}},
+                       .friction = 0,
+                       .linear_velocity = {0, 0, 1}});
+            const auto energy = [&] {
+                const BodyState state = b.world->state(id);
+                return kGravity * (state.pose.position.y + arm) +
+                       0.5f * dot(state.linear_velocity, state.linear_velocity);
+            };
+            const float before = energy();
+            float most = before, round = 0;
+            for (int i = 0; i < 600 * part; ++i) {
+                b.world->step(kStep / float(part));
+                most = std::max(most, energy());
+                const vec3 at = b.world->state(id).pose.position;
+                EXPECT_NEAR(std::hypot(std::hypot(at.x, at.z) - 4, at.y), arm, 0.05f) << as_field;
+                round = std::max(round, std::abs(at.z));
+            }
+            EXPECT_GT(round, 3) << "it goes round";
+            EXPECT_LT(most, before * 1.005f) << part << as_field;
+            EXPECT_GT(energy(), before * (part == 1 ? 0.92f : 0.96f)) << part << as_field;
+        }
+    }
+}
+
 }  // namespace

@@ -112,6 +112,12 @@ inline Edit inclined_plane(float degrees) {
     return e;
 }
 
+// The lower half of a hollow ring, cut out of a block.
+inline std::vector<Edit> ring_trough() {
+    return {edit(kiln::Box{.half_extents = {6.5f, 1.5f, 6.5f}}, {0, -1.5f, 0}),
+            edit(kiln::Torus{.major_radius = 4, .minor_radius = 2}, {}, Op::Subtract)};
+}
+
 // How far along the slope, and how fast.
 inline vec3 downhill(float degrees) { return {std::cos(degrees * kPi / 180), -std::sin(degrees * kPi / 180), 0}; }
 inline vec3 out_of(float degrees) { return {std::sin(degrees * kPi / 180), std::cos(degrees * kPi / 180), 0}; }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Starts threads.
 // Plays: what pictures of a scene see while its bodies run, on every engine that runs here.
+#include "field/field.h"
 #include "physics/debug_lines.h"
 #include "scene/simulation.h"
 
@@ -171,6 +172,79 @@ TEST(Play, CommandsChangeTheGroundBeforeTheNextStepAndNeverABody) {
         EXPECT_LT(shown(play).instances[1].pose.position.y, rest - 0.5f) << engine << ": dug away under it";
     }
     EXPECT_FALSE(world.find_edit("pit"));
+}
+
+TEST(Play, BakesNothingOfWhatTheWorldThatItBeginsFromHasBaked) {
+    World world = parsed(kScene);
+    // Its rows and slots are not those that its file would give.
+    for (const char* command :
+         {R"({"add": {"id": "gone", "shape": "sphere", "position": [3, 0, 0]}})",
+          R"({"add": {"id": "hill", "shape": "sphere", "position": [-4, -0.5, 0], "blend_radius": 0.2}})",
+          R"({"remove": "gone"})", R"({"add": {"id": "dent", "shape": "sphere", "op": "subtract", "radius": 0.3}})"})
+        ASSERT_TRUE(world.apply(command));
+    const auto drawn = world.frame(kCamera);
+    ASSERT_TRUE(drawn);
+    const uint64_t baked = drawn->field->revision();
+    const World read = parsed(world.to_json());
+    const std::string text = world.to_json();
+    for (const std::string& engine : engines()) {
+        Play play = started(world, engine), other = started(read, engine);
+        auto begun = Play::begin(world, {.backend = engine});
+        ASSERT_TRUE(begun);
+        EXPECT_EQ(shown(*begun).field->revision(), baked) << engine;
+        ASSERT_TRUE(begun->stop());
+        ASSERT_TRUE(play.step() && other.step());
+        EXPECT_EQ(shown(play).field->revision(), baked) << engine;
+        EXPECT_NE(shown(other).field->revision(), baked) << engine;
+        const char* dig =
+            R"({"add": {"shape": "sphere", "radius": 0.3, "position": [0.8, 0.3, 0.5], "op": "subtract"}})";
+        ASSERT_TRUE(play.apply(dig) && other.apply(dig));
+        ASSERT_TRUE(play.step() && other.step());
+        const Frame dug = shown(play), as_read = shown(other);
+        EXPECT_EQ(dug.field->parent_revision(), baked) << engine;
+        EXPECT_GT(dug.field->stats().bricks_baked, 0u);
+        EXPECT_LT(dug.field->stats().bricks_baked, dug.field->stats().bricks / 4) << engine << ": what the dig reaches";
+        // It is the play of the world as it would be read, to the bit.
+        EXPECT_EQ(dug.field->stats().bricks, as_read.field->stats().bricks);
+        ASSERT_EQ(dug.instances.size(), as_read.instances.size());
+        for (int i = 0; i < 60; ++i) ASSERT_TRUE(play.step() && other.step());
+        const Frame late = shown(play), late_as_read = shown(other);
+        for (size_t b = 0; b < late.instances.size(); ++b) {
+            EXPECT_EQ(late.instances[b].pose, late_as_read.instances[b].pose) << engine;
+            EXPECT_EQ(dug.instances[b].pose, as_read.instances[b].pose) << engine;
+        }
+        World one = parsed(text), two = parsed(text);
+        ASSERT_TRUE(play.keep(one) && other.keep(two));
+        EXPECT_EQ(one.to_json(), two.to_json()) << engine;
+        // From the start again it is the same field still.
+        ASSERT_TRUE(play.restart());
+        EXPECT_LT(shown(play).field->stats().bricks_baked, dug.field->stats().bricks / 4) << engine;
+    }
+    EXPECT_EQ(world.to_json(), text) << "the world stays as it is";
+    EXPECT_EQ(world.frame(kCamera)->field->revision(), baked);
+}
+
+TEST(Play, WhatWasMovedByHandStartsWhereTheListHasIt) {
+    World world = parsed(R"({"format": 1, "field": {"voxel_size": 0.1},
+      "edits": [{"id": "ground", "shape": "plane"},
+        {"id": "loose", "shape": "sphere", "radius": 0.3, "position": [3, 1, 0], "dynamic": true},
+        {"id": "blended", "shape": "sphere", "radius": 0.3, "position": [-3, 0, 0], "blend_radius": 0.2, "dynamic": true},
+        {"id": "ball", "shape": "sphere", "radius": 0.3, "position": [0, 1, 0]}],
+      "bodies": [{"id": "b", "edits": ["ball"]}]})");
+    ASSERT_TRUE(world.move(*world.find_edit("loose"), {{3, 2, 0}, {}}));
+    ASSERT_TRUE(world.move(*world.find_edit("blended"), {{-4, 0, 0}, {}}));
+    ASSERT_TRUE(world.frame(kCamera));
+    Play play = started(world, engines().front());
+    const World read = parsed(world.to_json());
+    Play other = started(read, engines().front());
+    const Frame frame = shown(play), as_read = shown(other);
+    ASSERT_EQ(frame.instances.size(), 2u);
+    for (size_t i = 0; i < 2; ++i) {
+        EXPECT_EQ(frame.instances[i].pose, as_read.instances[i].pose) << i;
+        EXPECT_EQ(frame.instances[i].before, as_read.instances[i].before) << i;
+    }
+    EXPECT_EQ(frame.field->stats().bricks, as_read.field->stats().bricks) << "the hump is where the list has it";
+    EXPECT_EQ(world.pose(*world.find_edit("loose"))->position, (vec3{3, 2, 0}));
 }
 
 TEST(Play, LinesAreThoseOfTheContactsTheShapesAndTheSleepers) {

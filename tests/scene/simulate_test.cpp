@@ -466,6 +466,43 @@ TEST(SlowSimulate, TheQuarrysBouldersRollDownAndComeToRest) {
         }
 }
 
+// What a person does there: the top of the buttress is sawn off, and later the ground dug away under a boulder.
+TEST(SlowSimulate, TheQuarryIsDugWhatIsCutOffFallsAndAllComesToRestAgain) {
+    const World world = parsed(quarry().dump());
+    const std::vector<TimedCommand> digs = {
+        {1.0, "digs",
+         R"({"time": 1, "command": {"add": {"id": "behind", "shape": "box", "half_extents": [2.5, 1, 0.2], "position": [-6.2, 8, -3.2], "op": "subtract"}}})",
+         1},
+        {1.0, "digs",
+         R"({"time": 1, "command": {"add": {"id": "slit", "shape": "box", "half_extents": [2.2, 0.15, 2.2], "position": [-6.2, 7.1, -1.2], "op": "subtract"}}})",
+         2},
+        {3.0, "digs",
+         R"({"time": 3, "command": {"add": {"id": "hole", "shape": "sphere", "radius": 1, "position": [-9.447, -0.4, 2.281], "op": "subtract"}}})",
+         3}};
+    for (const std::string& engine : engines()) {
+        const json out = run(world, {.seconds = 9, .backend = engine, .edits = digs});
+        const json& frames = out["frames"];
+        const auto at = [&](size_t frame, const char* id, const char* key) {
+            return body(frames[frame], id)[key][1].get<double>();
+        };
+        ASSERT_EQ(out["bodies"].back()["id"], "part1") << engine;
+        EXPECT_NEAR(at(61, "part1", "linear_velocity"), -9.81 / 60, 0.01 * 9.81 / 60) << engine;
+        EXPECT_NEAR(at(61, "part1", "position") - at(540, "part1", "position"), 0.3, 0.03) << engine << ": the slit";
+        EXPECT_NEAR(at(180, "boulder-5", "linear_velocity"), 0, 1e-3) << engine;
+        EXPECT_LT(at(181, "boulder-5", "linear_velocity"), -0.9 * 9.81 / 60) << engine << ": it leans on rubble";
+        EXPECT_LT(at(540, "boulder-5", "position"), at(180, "boulder-5", "position") - 0.5) << engine;
+        for (size_t i = 0; i < frames.size(); ++i)
+            for (const json& b : frames[i]["bodies"])
+                for (const char* key : {"position", "rotation", "linear_velocity", "angular_velocity"})
+                    for (const json& v : b[key]) ASSERT_TRUE(v.is_number()) << engine << i;
+        for (const json& b : frames.back()["bodies"]) {
+            EXPECT_TRUE(b["asleep"].get<bool>()) << engine << b["id"];
+            EXPECT_GT(b["position"][1].get<double>(), -1.4) << engine << b["id"];
+        }
+        EXPECT_EQ(run(world, {.seconds = 9, .backend = engine, .threads = 2, .edits = digs}), out) << engine;
+    }
+}
+
 // Sixteen more of four shapes, convex ones among them, dropped onto the benches.
 TEST(SlowSimulate, BouldersComeToRestInTheQuarryWithoutFallingThroughOrTrembling) {
     json scene = quarry();

@@ -26,6 +26,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <utility>
 
 namespace kiln::physics {
 
@@ -35,6 +36,7 @@ using namespace JPH;
 
 constexpr uint kMostBodies = World::kMostBodies, kMostPairs = 1 << 16, kMostManifolds = 1 << 16;
 constexpr uint kScratchBytes = 16 << 20;
+constexpr int kManyCome = 512;  // bodies between two steps
 // Iterations over the velocities of bodies that touch, as many for all that hang together. With 10, a stack of ten boxes sways more and
 // more, with 21 at times, and with 20 it sinks by 6 mm: 10 are for bodies that do not touch two others that move. A tower of eleven rings,
 // which lean and slide on each other so that few contacts begin with the impulse of the step before, sinks together and buckles with half of
@@ -228,6 +230,7 @@ protected:
         object->damped = dynamic && (b.settings.linear_damping > 0 || b.settings.angular_damping > 0);
         objects_[index] = std::move(object);
         damped_for_ = 0;
+        ++came_;
     }
 
     void destroy(uint32_t index) override {
@@ -302,6 +305,8 @@ protected:
             before.swap(touching_);
         }
         find_the_alone(before);
+        // Bodies that come one by one make a broad phase that looks at all pairs of them, once; a tree of all is made before.
+        if (std::exchange(came_, 0) >= kManyCome) system_.OptimizeBroadPhase();
         seconds_ = seconds;
         step_begins();
         (void)system_.Update(seconds, 1, &scratch_, jobs_.get());  // an overflow of pairs loses contacts, not bodies
@@ -422,6 +427,7 @@ private:
     std::vector<Pair> touching_;
     std::vector<int> moving_neighbours_;  // by index; a pair that touches at several places counts as often
     int moving_fields_ = 0;
+    int came_ = 0;          // since the last step
     float damped_for_ = 0;  // the step that dampings are set for
     float seconds_ = 0;     // of the step that is under way
 };
