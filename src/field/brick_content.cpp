@@ -109,7 +109,7 @@ bool BrickEvaluator::keeps_away(std::span<const sdf::Instruction> edit, ivec3 fi
     return sdf::keeps_away(sdf::view(*program_, edit), x_, y_, z_, from);
 }
 
-BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16_t> only) const {
+BrickContent BrickEvaluator::content(DistanceFormat format, uint16_t only) const {
     BrickContent out;
     if (format == DistanceFormat::Half) {
         HalfCodes& brick = out.half.renew();
@@ -123,8 +123,8 @@ BrickContent BrickEvaluator::content(DistanceFormat format, std::optional<uint16
             brick.codes[i] = uint8_t(snorm8_code(distances_[i] * voxels_per_metre_));
         out.solid_box = solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), 1), brick.solid);
     }
-    if (only) {
-        out.material = *only;
+    if (only != sdf::kSeveralMaterials) {
+        out.material = only;
     } else {
         BrickMaterials made = materials();
         // Texels of one material need no words.

@@ -90,8 +90,8 @@ public:
     const std::array<float, kBrickTexelCount>& distances() const { return distances_; }
     /// sdf::keeps_away() at the texels of the brick that begins at `first`. `from`: in voxels; its scale is set here.
     bool keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from);
-    /// Of the last evaluate(): what is stored. `only`: the material of all texels, where one knows.
-    BrickContent content(DistanceFormat format, std::optional<uint16_t> only = {}) const;
+    /// Of the last evaluate(): what is stored. `only`: the material of all texels, or kSeveralMaterials where one does not know.
+    BrickContent content(DistanceFormat format, uint16_t only = sdf::kSeveralMaterials) const;
 
 private:
     void place(ivec3 first);

@@ -13,7 +13,6 @@
 
 #include <algorithm>
 #include <memory>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -129,9 +128,10 @@ public:
     ivec3 cell(int ball) const { return cell_[ball]; }
     /// Of the cell that a sink is asked about: makes its code.
     void emit_code() { culler_.emit(cells_, ball_, code_); }
-    std::optional<uint16_t> only_material() {
-        if (!only_material_) only_material_ = culler_.only_material(cells_, ball_);
-        return *only_material_;
+    uint16_t only_material() {
+        if (!has_material_) only_material_ = culler_.only_material(cells_, ball_);
+        has_material_ = true;
+        return only_material_;
     }
     uint64_t cells_tested() const { return cells_tested_; }        ///< balls folded at any level of the hierarchy
     uint64_t cells_evaluated() const { return cells_evaluated_; }  ///< cells whose texels were looked at
@@ -164,9 +164,10 @@ private:
     std::vector<uint32_t>& rows_ = room_->rows;
     std::vector<sdf::Instruction>& code_ = room_->code;
     BrickEvaluator evaluator_;
-    ivec3 cell_[64];                                        // of the balls of cells_
-    int ball_ = 0;                                          // of the brick at hand
-    std::optional<std::optional<uint16_t>> only_material_;  // of its cell, once asked for
+    ivec3 cell_[64];             // of the balls of cells_
+    int ball_ = 0;               // of the brick at hand
+    bool has_material_ = false;  // whether only_material_ is that of its cell
+    uint16_t only_material_ = 0;
     uint64_t cells_tested_ = 0, cells_evaluated_ = 0;
 };
 
@@ -286,7 +287,7 @@ void CellMaker::run_cells(Sink& sink) {
         if (sink.keeps(cell_[i], inserted, culler_.start_of(cells_, i))) continue;
         if (sink.stop()) return;
         ball_ = i;
-        only_material_.reset();
+        has_material_ = false;
         if constexpr (kWholeList) {
             if ((still.ask >> i & 1u) != 0 && sink.texels_stay(cell_[i], *this)) continue;
         }

@@ -73,7 +73,7 @@ void StillTexels::see(std::span<const uint32_t> rows) {
     }
 }
 
-bool StillTexels::hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, std::optional<uint16_t> only,
+bool StillTexels::hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, uint16_t only,
                        BrickEvaluator& evaluator) const {
     if (!brick.half || brick.materials || only != brick.material) return false;
     for (size_t i = 0; i < changes_.size(); ++i) {

@@ -14,7 +14,6 @@
 #include "field/brick_content.h"
 #include "field/cell_maker.h"
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -34,9 +33,8 @@ public:
     void see(std::span<const uint32_t> rows);
     /// Of 64 cells, from the program's values at their centres. Which to ask about is a guess that keeps the price of asking in vain low.
     StillCells look(const sdf::Balls& centres, const float* values) const;
-    /// Whether the brick of a cell holds after all changes what it held before. `only`: the one material of all that the cell's new code has.
-    bool hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, std::optional<uint16_t> only,
-              BrickEvaluator& evaluator) const;
+    /// Whether the brick of a cell holds after all changes what it held before. `only`: ListCuller::only_material() of its new code.
+    bool hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick, uint16_t only, BrickEvaluator& evaluator) const;
 
 private:
     const sdf::Program* program_;

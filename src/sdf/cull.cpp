@@ -206,14 +206,13 @@ void ListCuller::emit(const Fold& fold, int ball, std::vector<Instruction>& out)
     });
 }
 
-std::optional<uint16_t> ListCuller::only_material(const Fold& fold, int ball) const {
+uint16_t ListCuller::only_material(const Fold& fold, int ball) const {
     uint16_t out = uint16_t(kNoMaterial);
     each_kept(fold, ball, [&](size_t i, bool, bool) {
         const uint16_t material = program_->edits[entries_[fold.list.first + i].row].material;
         if (material == kNoMaterial || material == out) return;  // what has none shows another's
         out = out == kNoMaterial ? material : kSeveralMaterials;
     });
-    if (out == kSeveralMaterials) return std::nullopt;
     return out == kNoMaterial ? uint16_t(kDefaultMaterial) : out;
 }
 

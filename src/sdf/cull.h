@@ -9,7 +9,6 @@
 #include "sdf/prune.h"
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -46,8 +45,8 @@ public:
     /// Then, for one ball: its list, or its code (replacing `out`).
     List child(const Fold& fold, int ball);
     void emit(const Fold& fold, int ball, std::vector<Instruction>& out);
-    /// The one material of everything in the ball, where its edits have but one.
-    std::optional<uint16_t> only_material(const Fold& fold, int ball) const;
+    /// The one material of everything in the ball; kSeveralMaterials where its edits have more than one.
+    uint16_t only_material(const Fold& fold, int ball) const;
     /// How the ball's code begins. What was before that, and lost, is not in the code; yet it may have lost only because of an edit
     /// that is gone, or has come, and lost with it: code is another where its beginning is.
     struct Start {

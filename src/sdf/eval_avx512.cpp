@@ -9,17 +9,13 @@
 #define KILN_VECTORS (64 / KILN_LANES)
 
 namespace kiln::sdf::avx512 {
-#include "sdf/lang/simd.h"
-#define KILN_T param
-#include "sdf/lang/trig.sdf.h"
-#undef KILN_T
-#define KILN_T real
-#include "sdf/lang/trig.sdf.h"
-#undef KILN_T
-#include "sdf/lang/explog.sdf.h"
-#include "sdf/lang/material.sdf.h"
+#include "sdf/eval_texts.inl"
 
-#include "sdf/texts.gen.inl"
+// The same texts, whose roots are found by products: to the same bits, and beside others that wait for the divider.
+#define KILN_PRODUCTS
+namespace products {
+#include "sdf/eval_texts.inl"
+}  // namespace products
 
 static inline real load(const float* from) {
     lane_f v;

@@ -29,6 +29,12 @@ static inline void set_point(Chunk* p, int i, real3 q) {
 static inline param3 param3_at(const float* w) { return param3(param(w[0]), param(w[1]), param(w[2])); }
 
 #ifndef KILN_FEW
+// op_distance() of k = 0 with its zeros left out, which changes no bit.
+template <uint32_t kOp>
+static inline real hard_op(real a, real b) {
+    return kOp == 0 ? min(a, b) : kOp == 1 ? -min(-a, b) : -min(-a, -b);
+}
+
 // Row-major 3x3 matrix times (p - t); w = t[3] M[9].
 static inline real3 affine(real3 p, const float* w) {
     const real3 q = p - param3_at(w);
@@ -159,6 +165,25 @@ static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const f
 }
 #endif
 
+template <uint32_t kOp>
+static inline void combine_as(Chunk& dst, const Chunk& a, const Chunk& b, param k) {
+    if (k > param(0)) {
+        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(kOp, a.v[i], b.v[i], k);
+    } else {
+        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = hard_op<kOp>(a.v[i], b.v[i]);
+    }
+}
+static inline void combine(Chunk& dst, const Chunk& a, const Chunk& b, uint32_t op, param k) {
+    switch (op) {
+        case 0: combine_as<0>(dst, a, b, k); break;
+        case 1: combine_as<1>(dst, a, b, k); break;
+        case 2: combine_as<2>(dst, a, b, k); break;
+        default:
+            for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = a.v[i];
+            break;
+    }
+}
+
 static void run_distance(Registers& r, const uint32_t* code, size_t count, const float* params, Samples samples) {
     for (size_t pc = 0; pc < count; ++pc) {
         const uint32_t word = code[2 * pc];
@@ -174,24 +199,7 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
         }
 #endif
         switch (Opcode(word & 31u)) {
-            case Opcode::Combine: {
-                const param k = param(w[0]);
-                switch (aux & 3u) {
-                    case 0:
-                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(0, a.v[i], b.v[i], k);
-                        break;
-                    case 1:
-                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(1, a.v[i], b.v[i], k);
-                        break;
-                    case 2:
-                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = op_distance(2, a.v[i], b.v[i], k);
-                        break;
-                    default:
-                        for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = a.v[i];
-                        break;
-                }
-                break;
-            }
+            case Opcode::Combine: combine(dst, a, b, aux & 3u, param(w[0])); break;
             case Opcode::Move:
                 for (int i = 0; i < KILN_VECTORS; ++i) dst.v[i] = a.v[i];
                 break;

@@ -63,19 +63,7 @@ void fold_list(const FoldEntry* entries, size_t count, const float* params, cons
         }
         left[at] = chunk_bits(wins_left);
         right[at] = chunk_bits(wins_right);
-        const param k = param(e.blend);
-        switch (e.op) {
-            case 0:
-                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(0, running.v[i], other.v[i], k);
-                break;
-            case 1:
-                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(1, running.v[i], other.v[i], k);
-                break;
-            case 2:
-                for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = op_distance(2, running.v[i], other.v[i], k);
-                break;
-            default: break;
-        }
+        combine(running, running, other, e.op, param(e.blend));
     }
     store_chunk(r.value[0], value, kChunkPoints);
 }
@@ -87,40 +75,88 @@ static constexpr int kBrickLanes = kChunkPoints / KILN_VECTORS;
 struct BrickPoints {
     real x[kSliceVectors], y[kSliceVectors];
     param z[kBrickSlices];
+    bool plain;  // see is_plain()
 };
 struct BrickValues {
     real v[kBrickSlices][kSliceVectors];
 };
 
+#ifdef KILN_PRODUCTS
+// Numbers of which no leaf makes any whose square is lost: sums and differences of 0 and of what is from 2^-21 to 2^40 in size are multiples of 2^-44.
+static inline bool is_plain(float v) {
+    const float size = abs(v);
+    return size <= 0 || (size >= 0x1p-21f && size < 0x1p40f);
+}
+static inline mask is_plain(real v) {
+    const real size = abs(v);
+    return either(le(size, real(0.0f)), both(ge(size, real(0x1p-21f)), lt(size, real(0x1p40f))));
+}
+#endif
+
+// A leaf whose shape is fused: its own copy of all numbers, so that no store to the brick's values might change one.
+struct FusedLeaf {
+    real x[kSliceVectors], y[kSliceVectors];  // of a slice, from the shape's middle
+    param z, scale;
+    float shape[3];
+
+    FusedLeaf(uint32_t kind, const BrickPoints& points, const float* t, const float* w)
+        : z(param(t[2])), scale(param(w[0])), shape{w[3], 0, 0} {
+        if (kind == kFusedBox) shape[1] = w[4], shape[2] = w[5];
+        for (int i = 0; i < kSliceVectors; ++i) {
+            x[i] = points.x[i] - param(t[0]);
+            y[i] = points.y[i] - param(t[1]);
+        }
+    }
+    // At vector i of a slice. The root of every kProducts-th vector is found by products, beside the divider: where there is other work for
+    // multipliers, they take fewer.
+    template <uint32_t kShape, int kProducts>
+    __attribute__((always_inline)) real distance(int i, real from_z) const {
+#ifdef KILN_PRODUCTS
+        if (i % kProducts == kProducts - 1) {
+            const products::real3 p(x[i].v, y[i].v, from_z.v);
+            return products::shape_distance(kShape, p, shape, products::Samples{nullptr}).v;
+        }
+#endif
+        return shape_distance(kShape, real3(x[i], y[i], from_z), shape, Samples{nullptr});
+    }
+};
+
 // How a leaf's value meets the running one.
 struct JoinSet {
+    static constexpr int kProducts = 2;
     KILN_SDF real join(real, real d, param) { return d; }
 };
 struct JoinNegated {
+    static constexpr int kProducts = 2;
     KILN_SDF real join(real, real d, param) { return -d; }
 };
-// k = 0: op_distance() with its zeros left out, which changes no bit.
-struct JoinUnion {
-    KILN_SDF real join(real a, real d, param) { return min(a, d); }
+template <uint32_t kOp>
+struct JoinHard {
+    static constexpr int kProducts = 2;
+    KILN_SDF real join(real a, real d, param) { return hard_op<kOp>(a, d); }
 };
-struct JoinSubtract {
-    KILN_SDF real join(real a, real d, param) { return -min(-a, d); }
-};
-template <int kOp>
+template <uint32_t kOp>
 struct JoinSmooth {
-    KILN_SDF real join(real a, real d, param k) { return op_distance(kOp, a, d, k); }
+    static constexpr int kProducts = 4;
+    KILN_SDF real join(real a, real d, param k) {
+#ifdef KILN_PRODUCTS
+        return products::op_distance(kOp, a.v, d.v, k).v;
+#else
+        return op_distance(kOp, a, d, k);
+#endif
+    }
 };
 
 // kScaled: the shape's values are times something else than 1.
 template <uint32_t kShape, typename Join, bool kScaled>
 static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, BrickValues& values, const float* t, const float* w, float k) {
-    const param tx = param(t[0]), ty = param(t[1]), tz = param(t[2]), scale = param(w[0]);
-    for (int i = 0; i < kSliceVectors; ++i) {
-        const real x = points.x[i] - tx, y = points.y[i] - ty;
-        for (int slice = 0; slice < kBrickSlices; ++slice) {
-            const real3 p(x, y, real(points.z[slice] - tz));
-            const real d = shape_distance(kShape, p, w + 3, Samples{nullptr});
-            values.v[slice][i] = Join::join(values.v[slice][i], kScaled ? d * scale : d, param(k));
+    const FusedLeaf leaf(kShape, points, t, w);
+    for (int slice = 0; slice < kBrickSlices; ++slice) {
+        const real from_z = real(points.z[slice] - leaf.z);
+#pragma GCC unroll 16
+        for (int i = 0; i < kSliceVectors; ++i) {
+            const real d = leaf.distance<kShape, kShape == kFusedSphere ? Join::kProducts : 4>(i, from_z);
+            values.v[slice][i] = Join::join(values.v[slice][i], kScaled ? d * leaf.scale : d, param(k));
         }
     }
 }
@@ -131,8 +167,8 @@ using BrickLeaf = void (*)(const BrickPoints&, BrickValues&, const float*, const
 template <uint32_t kShape, bool kScaled>
 static BrickLeaf leaf_of(int join) {
     switch (join) {
-        case 0: return &brick_leaf<kShape, JoinUnion, kScaled>;
-        case 1: return &brick_leaf<kShape, JoinSubtract, kScaled>;
+        case 0: return &brick_leaf<kShape, JoinHard<0>, kScaled>;
+        case 1: return &brick_leaf<kShape, JoinHard<1>, kScaled>;
         case 2: return &brick_leaf<kShape, JoinSmooth<0>, kScaled>;
         case 3: return &brick_leaf<kShape, JoinSmooth<1>, kScaled>;
         case 4: return &brick_leaf<kShape, JoinSet, kScaled>;
@@ -146,8 +182,20 @@ static inline const float* leaf_origin(const uint32_t* code, const float* params
     return Opcode(code[0] & 31u) == Opcode::PointTranslate ? params + code[1] : kOrigin;
 }
 
+// Whether a leaf's numbers, k among them, are within the bounds of its fused text.
+static inline bool may_fuse(const BrickPoints& points, const uint32_t* code, const float* t, const float* w, float k) {
+#ifdef KILN_PRODUCTS
+    bool plain = points.plain && is_plain(t[0]) && is_plain(t[1]) && is_plain(t[2]) && (k <= 0 || (k > 0x1p-60f && k < 0x1p60f));
+    if (((code[2] >> 5) & 255u) == kFusedBox) plain = plain && is_plain(w[3]) && is_plain(w[4]) && is_plain(w[5]);
+    return plain;
+#else
+    return true;
+#endif
+}
+
 // The leaf of [point] [shape] [combine, move, negate or take] at `code`, when it is one of those that run over the whole brick.
-static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* params, const float*& t, float& k) {
+static BrickLeaf fused_leaf(const BrickPoints& points, const uint32_t* code, size_t left, const float* params, const float*& t,
+                            float& k) {
     if (left < 3) return nullptr;
     const Opcode join = Opcode(code[4] & 31u);
     if (!is_fused_leaf(code[0], code[2]) || ((code[2] >> 13) & 31u) != 1u) return nullptr;
@@ -165,7 +213,7 @@ static BrickLeaf fused_leaf(const uint32_t* code, size_t left, const float* para
     } else if (join == Opcode::Take && dst == 0 && b == 1) {
         how = aux == 1u ? 5 : 4;
     }
-    if (how < 0) return nullptr;
+    if (how < 0 || !may_fuse(points, code, t, params + code[3], k)) return nullptr;
     const bool scaled = params[code[3]] != 1;
     switch ((code[2] >> 5) & 255u) {
         case kFusedSphere: return scaled ? leaf_of<kFusedSphere, true>(how) : leaf_of<kFusedSphere, false>(how);
@@ -185,6 +233,15 @@ static void place_brick(BrickPoints& points, const float* x, const float* y, con
         points.y[i] = load(row_y + i * kBrickLanes);
     }
     for (int slice = 0; slice < kBrickSlices; ++slice) points.z[slice] = param(z[slice]);
+#ifdef KILN_PRODUCTS
+    __builtin_memcpy(row_y, z, 8 * sizeof(float));
+    __builtin_memcpy(row_y + 8, z, 8 * sizeof(float));
+    mask plain = both(is_plain(points.x[0]), is_plain(load(row_y)));
+    for (int i = 0; i < kSliceVectors; ++i) plain = both(plain, is_plain(points.y[i]));
+    points.plain = all_of(plain);
+#else
+    points.plain = true;
+#endif
 }
 static void place_slice(Registers& r, const BrickPoints& points, int slice) {
     for (int i = 0; i < kSliceVectors; ++i) {
@@ -212,7 +269,7 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
     while (pc < count) {
         const float* t;
         float k;
-        if (const BrickLeaf leaf = fused_leaf(code + 2 * pc, count - pc, params, t, k)) {
+        if (const BrickLeaf leaf = fused_leaf(points, code + 2 * pc, count - pc, params, t, k)) {
             leaf(points, values, t, params + code[2 * pc + 3], k);
             pc += 3;
             continue;
@@ -327,14 +384,13 @@ static inline mask too_near(const Away& from, real value, int texel) {
 
 template <uint32_t kShape>
 static __attribute__((noinline)) bool leaf_keeps_away(const BrickPoints& points, const float* t, const float* w, const Away& from) {
-    const param tx = param(t[0]), ty = param(t[1]), tz = param(t[2]), scale = param(w[0]);
-    for (int i = 0; i < kSliceVectors; ++i) {
-        const real x = points.x[i] - tx, y = points.y[i] - ty;
+    const FusedLeaf leaf(kShape, points, t, w);
+    for (int slice = 0; slice < kBrickSlices; ++slice) {
+        const real from_z = real(points.z[slice] - leaf.z);
         mask near = gt(real(param(0)), real(param(0)));
-        for (int slice = 0; slice < kBrickSlices; ++slice) {
-            const real d = shape_distance(kShape, real3(x, y, real(points.z[slice] - tz)), w + 3, Samples{nullptr}) * scale;
-            near = either(near, too_near(from, d, slice * kChunkPoints + i * kBrickLanes));
-        }
+#pragma GCC unroll 16
+        for (int i = 0; i < kSliceVectors; ++i)
+            near = either(near, too_near(from, leaf.distance<kShape, 4>(i, from_z) * leaf.scale, slice * kChunkPoints + i * kBrickLanes));
         if (lane_bits(near) != 0) return false;
     }
     return true;
@@ -345,7 +401,7 @@ bool keeps_away(const uint32_t* code, size_t count, const float* params, const f
                 const float* z, const Away& from, void* memory) {
     BrickPoints points;
     place_brick(points, x, y, z);
-    if (count == 2 && is_fused_leaf(code[0], code[2])) {
+    if (count == 2 && is_fused_leaf(code[0], code[2]) && may_fuse(points, code, leaf_origin(code, params), params + code[3], 0)) {
         const auto leaf = ((code[2] >> 5) & 255u) == kFusedSphere ? &leaf_keeps_away<kFusedSphere> : &leaf_keeps_away<kFusedBox>;
         return leaf(points, leaf_origin(code, params), params + code[3], from);
     }

@@ -9,17 +9,7 @@
 #define KILN_VECTORS (64 / KILN_LANES)
 
 namespace kiln::sdf::sse4 {
-#include "sdf/lang/simd.h"
-#define KILN_T param
-#include "sdf/lang/trig.sdf.h"
-#undef KILN_T
-#define KILN_T real
-#include "sdf/lang/trig.sdf.h"
-#undef KILN_T
-#include "sdf/lang/explog.sdf.h"
-#include "sdf/lang/material.sdf.h"
-
-#include "sdf/texts.gen.inl"
+#include "sdf/eval_texts.inl"
 
 static inline real load(const float* from) {
     lane_f v;

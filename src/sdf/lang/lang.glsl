@@ -21,6 +21,7 @@
 #define no(a) (!(a))
 #define all_of(a) (a)
 #define select(m, a, b) ((m) ? (a) : (b))
+#define part_of(n, k) ((n) / (k))
 #define whole_of(a) uint(int(a))
 #define real_of(a) float(a)
 #define bits_of(a) floatBitsToUint(a)

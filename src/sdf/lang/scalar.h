@@ -56,6 +56,7 @@ KILN_SDF real min(real a, real b) { return b < a ? b : a; }
 KILN_SDF real max(real a, real b) { return a < b ? b : a; }
 KILN_SDF real clamp(real x, real lo, real hi) { return min(max(x, lo), hi); }
 KILN_SDF real abs(real a) { return std::fabs(a); }
+KILN_SDF real part_of(real n, param k) { return n / k; }
 KILN_SDF real sqrt(real a) { return std::sqrt(a); }
 KILN_SDF real floor(real a) { return std::floor(a); }
 KILN_SDF real3 min(real3 a, real3 b) { return {min(a.x, b.x), min(a.y, b.y), min(a.z, b.z)}; }
