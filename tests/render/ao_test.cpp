@@ -205,19 +205,26 @@ TEST_F(AoGpu, ABallOnAPlaneHidesWhatItsFormFactorSays) {
     field::worlds::World w = plane_world();
     w.edits.push_back(edit(Sphere{.radius = r}, {0, r, 0}));
     const Frame frame = looking_down(w);
-    for (const auto& [ao, worst, mean] :
-         {std::tuple{AmbientOcclusion::Full, 0.045, 0.006}, std::tuple{AmbientOcclusion::Half, 0.07, 0.011}}) {
-        const Picture p = open(frame, {.width = 128, .height = 96, .ao = ao});
+    struct Case {
+        AmbientOcclusion ao;
+        int width;
+        double worst, by_edge, mean;
+    };
+    for (const Case& c :
+         {Case{AmbientOcclusion::Full, 128, 0.032, 0.075, 0.006}, Case{AmbientOcclusion::Full, 256, 0.04, 0.065, 0.005},
+          Case{AmbientOcclusion::Half, 128, 0.05, 0.19, 0.011}}) {
+        const bool full = c.ao == AmbientOcclusion::Full;
+        const Picture p = open(frame, {.width = c.width, .height = c.width * 3 / 4, .ao = c.ao});
         const Apart all = apart(p, frame.camera, 0, beside(0, 0, r));
         EXPECT_GT(all.judged, 700);
-        EXPECT_LE(all.worst, worst) << "half: " << (ao == AmbientOcclusion::Half);
-        EXPECT_LE(all.worst_by_edge, ao == AmbientOcclusion::Full ? 0.09 : 0.2);
-        EXPECT_LE(all.mean, mean);
+        EXPECT_LE(all.worst, c.worst) << c.width << ", half: " << !full;
+        EXPECT_LE(all.worst_by_edge, c.by_edge) << c.width << ", half: " << !full;
+        EXPECT_LE(all.mean, c.mean) << c.width << ", half: " << !full;
         for (const double x : {1.0, 2.0, 4.0}) {
             const Apart at = apart(p, frame.camera, 0, beside(0, 0, r, x - 0.08, x + 0.08));
             EXPECT_GT(at.judged, 90) << x;
-            EXPECT_LE(std::fabs(at.bias), ao == AmbientOcclusion::Full ? 0.01 : 0.03) << x;
-            EXPECT_LE(at.worst, x > 1 && ao == AmbientOcclusion::Full ? 0.03 : worst) << x;
+            EXPECT_LE(std::fabs(at.bias), full ? 0.005 : 0.03) << x;
+            EXPECT_LE(at.worst, full ? 0.03 : c.worst) << "at " << x << ", every pixel of " << c.width;
         }
         EXPECT_GT(renderer->stats().pass_evaluations.back().second, 1000u);
         EXPECT_TRUE(renderer->stats().pass_evaluations.back().first.starts_with("ao"));

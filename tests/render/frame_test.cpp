@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Whole pictures, under validation: the cached path against the exact one, and against itself.
+#include "field/twenty_worlds.h"
 #include "gpu_worlds.h"
 
 #include <cmath>
@@ -86,6 +87,29 @@ TEST_F(FrameGpu, JumpsAndTheWayIntoTheAtlasChangeNoPixel) {
         if (std::isinf(host.depth[i]) || std::isinf(copied.depth[i])) continue;
         EXPECT_NEAR(host.depth[i], copied.depth[i], 1e-3f);
     }
+}
+
+struct FrameSlowGpu : FrameGpu {};
+
+// Gate G4 over the twenty worlds: from outside, flat over what is there, and from within a brick.
+TEST_F(FrameSlowGpu, JumpsChangeNoPixelOfTwentyWorlds) {
+    int seen = 0;
+    for (const auto& world : field::worlds::twenty()) {
+        const Box3 box = world.options.bounds;
+        const vec3 middle = (box.min + box.max) * 0.5f, half = (box.max - box.min) * 0.5f;
+        Frame frame = frame_of(world);
+        for (const vec3 from : {vec3{1.6f, 1.2f, 2.1f}, vec3{1.4f, 0.02f, 0.3f}, vec3{0.31f, 0.13f, -0.2f}}) {
+            frame.camera.position = middle + from * half;
+            frame.camera.target = middle;
+            const View view = from.x > 1.5f ? View::Shaded : View::Normal;
+            const Picture fast = picture(frame, {.view = view});
+            const Picture slow = picture(frame, {.view = view, .accelerate = false});
+            EXPECT_EQ(fast.depth, slow.depth) << world.name << " from " << from.x;
+            EXPECT_EQ(fast.rgba, slow.rgba) << world.name << " from " << from.x;
+            for (const float d : fast.depth) seen += std::isfinite(d);
+        }
+    }
+    EXPECT_GT(seen, 50000);
 }
 
 TEST_F(FrameGpu, SameInputSameBytesAndNoPipelineOnceWarm) {

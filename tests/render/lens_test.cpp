@@ -36,6 +36,21 @@ TEST(Lens, GlowsKeepTheLightOfASpark) {
     }
 }
 
+// Ten passes of the classic blur are one Gaussian of the sum of their variances, in closed form.
+TEST(Lens, TheClassicBlurIsAGaussian) {
+    Picture p = black(96, 96);
+    set(p, 48, 47, 1000);
+    const auto glow = glow_of(p, {.bloom = 1, .bloom_kind = BloomKind::Gaussian}, 1);
+    double sum = 0, second = 0;
+    for (int i = -6; i <= 6; ++i) sum += std::exp(-i * i / 8.0), second += i * i * std::exp(-i * i / 8.0);
+    const double variance = 5 * second / sum, peak = 1000 / (2 * std::numbers::pi * variance);
+    for (int y = 30; y < 64; ++y)
+        for (int x = 30; x < 66; ++x)
+            EXPECT_NEAR(glow[size_t(y) * 96 + size_t(x)].y,
+                        peak * std::exp(-((x - 48) * (x - 48) + (y - 47) * (y - 47)) / (2 * variance)), 0.02 * peak)
+                << x << ", " << y;
+}
+
 TEST(Lens, GlowIsRound) {
     Picture p = black(256, 256);
     for (const int x : {127, 128})

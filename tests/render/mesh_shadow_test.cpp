@@ -2,6 +2,11 @@
 // What a workgroup leaves out when it looks for shadowing triangles together changes no bit; nor do the backs of closed surfaces.
 #include "drawables.h"
 #include "gpu_worlds.h"
+#include "render/lib/lights.gpu.h"
+#include "render/lib/pack.h"
+#include "render/mesh_trace.h"
+
+#include <cmath>
 
 namespace kiln::render {
 namespace {
@@ -130,6 +135,89 @@ TEST_F(MeshShadowGpu, ALampInAClosedBoxLightsNothingOutsideIt) {
     for (const float side : {1.0f, -1.0f}) {
         frame.meshes[0].transform.scale = {side, 1, 1};
         EXPECT_EQ(brightest(), 0) << side;
+    }
+}
+
+// A ball of 32 000 triangles with knobs all over, so that nodes of its tree overlap and edges of its shadow lie in several of them.
+std::shared_ptr<const model::Drawable> knobbly(float radius) {
+    auto out = std::make_shared<model::Drawable>(*meshes::sphere(radius, 180, meshes::matte({0.5f, 0.5f, 0.5f}, 1)));
+    for (model::Vertex& v : out->vertices) {
+        const vec3 n = v.normal;
+        v.position = n * (radius * (1 + 0.16f * std::sin(13 * n.x) * std::sin(11 * n.y + 1) * std::sin(12 * n.z + 2)));
+    }
+    model::finish(*out);
+    return out;
+}
+
+// Three of them over a floor, turned, stretched and mirrored; 400 rays a pixel to each light's disc, in double precision, say what is seen of it.
+TEST_F(MeshShadowGpu, SharesOfDiscsBehindDeepTreesAreWhatRaysCount) {
+    field::worlds::World w;
+    w.name = "speck";
+    w.edits = {field::worlds::edit(Sphere{.radius = 0.05f}, {0, -3, 0})};
+    w.options.voxel_size = 0.05f;
+    w.options.bounds = Box3{{-0.2f, -3.2f, -0.2f}, {0.2f, -2.8f, 0.2f}};
+    Frame open = frame_of(w, {-0.3f, 1.9f, 1.3f});
+    open.camera.target = {-0.1f, 0, 0};
+    open.environment = Environment{.color = {0, 0, 0}};
+    open.meshes = {meshes::at(meshes::sheet(-3, -3, 3, 3, meshes::matte({0.6f, 0.6f, 0.6f}, 1)))};
+    Frame shaded = open;
+    const auto ball = knobbly(0.22f);
+    shaded.meshes.push_back(meshes::at(ball, {-0.1f, 0.5f, -0.1f}, axis_angle({0.6f, 0, 0.8f}, 0.7f)));
+    shaded.meshes.push_back(meshes::at(ball, {0.45f, 0.4f, 0.2f}, axis_angle({0, 0.6f, 0.8f}, 2)));
+    shaded.meshes.back().transform.scale = {-1.3f, 0.6f, 1};
+    shaded.meshes.push_back(meshes::at(ball, {-0.6f, 0.25f, 0.3f}));
+    shaded.meshes.back().transform.scale = {0.5f, 1, 0.7f};
+    const MeshSet set = make_mesh_set(shaded);
+    const MeshTrace trace(set);
+    const Light lights[] = {
+        {.kind = Light::Kind::Directional, .direction = {-0.4f, -1, -0.3f}, .angular_diameter_deg = 16},
+        {.kind = Light::Kind::Point, .position = {0.3f, 1.4f, 0.4f}, .intensity = 3, .radius = 0.2f},
+        {.kind = Light::Kind::Spot,
+         .direction = {0.3f, -1, -0.1f},
+         .position = {-0.5f, 1.7f, 0.2f},
+         .intensity = 9,
+         .radius = 0.15f,
+         .inner_deg = 50,
+         .outer_deg = 70}};
+    constexpr int kWidth = 64, kHeight = 48, kRays = 400;
+    const shade::CameraParams eye = shade::camera_params(open.camera, kWidth, kHeight);
+    for (const Light& light : lights) {
+        open.lights = shaded.lights = {light};
+        const RenderSettings settings{.width = kWidth, .height = kHeight, .ao = AmbientOcclusion::Off};
+        const Picture a = rhi::must(renderer->render(open, settings)),
+                      b = rhi::must(renderer->render(shaded, settings));
+        const shade::LightRecord record = shade::light_record(light);
+        double worst = 0, sum = 0;
+        int judged = 0, dark = 0, half = 0;
+        for (int i = 0; i < kWidth * kHeight; ++i) {
+            const float lit = a.rgba[4 * size_t(i)];
+            if (a.depth[size_t(i)] != b.depth[size_t(i)] || !(lit > 0.01f)) continue;  // the floor, and in the light
+            const vec3 d = shade::camera_direction_at(eye, float(i % kWidth) + 0.5f, float(i / kWidth) + 0.5f);
+            const vec3 p = open.camera.position + d * a.depth[size_t(i)];
+            const shade::LightSample to = shade::sample_light(record, p);
+            const shade::Basis basis = shade::basis_around(to.l);
+            int seen = 0;
+            for (int k = 0; k < kRays; ++k) {  // Vogel's spiral: equal parts of the disc
+                const double r = double(to.tan_radius) * std::sqrt((k + 0.5) / kRays), turn = 2.39996322972865 * k;
+                const vec3 way =
+                    to.l + basis.tangent * float(r * std::cos(turn)) + basis.bitangent * float(r * std::sin(turn));
+                const double size = std::sqrt(double(dot(way, way)));
+                seen += !trace.hides({double(p.x), 1e-4, double(p.z)},
+                                     {double(way.x) / size, double(way.y) / size, double(way.z) / size},
+                                     std::min(double(to.distance), 1e3) * size);
+            }
+            const double by = std::fabs(double(b.rgba[4 * size_t(i)]) / double(lit) - double(seen) / kRays);
+            worst = std::max(worst, by);
+            sum += by;
+            ++judged;
+            dark += seen == 0;
+            half += seen > 0 && seen < kRays;
+        }
+        EXPECT_GT(judged, 1500);
+        EXPECT_GT(dark, 20);
+        EXPECT_GT(half, 200);
+        EXPECT_LE(worst, 0.02) << "light " << &light - lights;
+        EXPECT_LE(sum / half, 0.004) << "light " << &light - lights;
     }
 }
 

@@ -261,6 +261,74 @@ TEST_F(ThroughGpu, PanesCoverTheirShareFromFarToNear) {
     EXPECT_NEAR(got.z, wanted.z, 0.01f);
 }
 
+// Six panes that cut each other: which is nearer changes across the picture. Every pixel against the list of what its ray meets, sorted.
+TEST_F(ThroughGpu, PanesThatCutEachOtherAreWhatASortedListSays) {
+    Frame frame = bright_frame();
+    frame.environment->color = {0, 0, 0};
+    struct Pane {
+        vec3 color;
+        double share;
+        Transform place;
+    };
+    std::vector<Pane> panes;
+    for (int i = 0; i < 6; ++i) {
+        const float turn = 1.1f * float(i);
+        Pane& pane = panes.emplace_back();
+        pane.color = {i % 3 == 0 ? 3.0f : 0.2f, i % 3 == 1 ? 2.0f : 0.1f, i % 3 == 2 ? 2.5f : 0.4f};
+        pane.share = (50 + 30 * i) / 255.0;
+        const vec3 axis = normalize(vec3{1, 0.3f * std::sin(turn), 0.4f * std::cos(turn)});
+        pane.place = {{0.1f * std::sin(turn), 0.1f * std::cos(turn), 0.15f * std::sin(2 * turn)},
+                      axis_angle(axis, 1.57f + 0.5f * std::sin(2 * turn)),
+                      {1, 1, 1}};
+        model::Surface s = meshes::matte({0, 0, 0}, 1);
+        s.base_color.w = float(pane.share);
+        s.emissive = pane.color;
+        s.blend = s.double_sided = true;
+        frame.meshes.push_back(
+            meshes::at(meshes::sheet(-0.8f, -0.8f, 0.8f, 0.8f, s), pane.place.position, pane.place.rotation));
+    }
+    const Picture p = rhi::must(renderer->render(frame, {.width = 96, .height = 72, .transparent_layers = 6}));
+    const shade::CameraParams eye = shade::camera_params(frame.camera, p.width, p.height);
+    int judged = 0, deep = 0, orders = 0;
+    std::vector<size_t> before;
+    double worst = 0;
+    for (int i = 0; i < p.width * p.height; ++i) {
+        const vec3 d = shade::camera_direction_at(eye, float(i % p.width) + 0.5f, float(i / p.width) + 0.5f);
+        std::vector<std::pair<double, size_t>> met;
+        bool sure = true;
+        for (size_t k = 0; k < panes.size(); ++k) {
+            const quat back = conjugate(panes[k].place.rotation);
+            const vec3 o = rotate(back, frame.camera.position - panes[k].place.position), v = rotate(back, d);
+            const double t = -double(o.y) / double(v.y);
+            const double off =
+                std::max(std::fabs(double(o.x) + t * double(v.x)), std::fabs(double(o.z) + t * double(v.z)));
+            sure = sure && std::fabs(off - 0.8) > 1e-3 && std::fabs(double(v.y)) > 0.02;
+            if (off < 0.8 && t > 0) met.emplace_back(t, k);
+        }
+        std::sort(met.begin(), met.end());
+        for (size_t k = 1; k < met.size(); ++k) sure = sure && met[k].first - met[k - 1].first > 1e-3;
+        if (!sure) continue;
+        std::vector<size_t> order;
+        double left = 1, sum[3] = {};
+        for (const auto& [t, k] : met) {
+            order.push_back(k);
+            const double of[3] = {panes[k].color.x, panes[k].color.y, panes[k].color.z};
+            for (size_t c = 0; c < 3; ++c) sum[c] += left * panes[k].share * of[c];
+            left *= 1 - panes[k].share;
+        }
+        for (size_t c = 0; c < 3; ++c)
+            worst = std::max(worst, std::fabs(double(p.rgba[4 * size_t(i) + c]) - sum[c]) - 0.01 * sum[c]);
+        ++judged;
+        deep += met.size() >= 5;
+        orders += order != before;
+        before = order;
+    }
+    EXPECT_GT(judged, 4000);
+    EXPECT_GT(deep, 300);
+    EXPECT_GT(orders, 100);
+    EXPECT_LE(worst, 0.002) << "more than a hundredth";
+}
+
 // Dark glass goes over a bright sky: where it was three frames ago the sky is as bright as ever, and where it is it is as dark.
 TEST_F(ThroughGpu, MovingGlassLeavesNoTrail) {
     Frame frame = bright_frame();

@@ -50,7 +50,7 @@ layout(constant_id = 5) const bool kAlongCode = true;
 #include "render/passes/ao_rays.glsl"
 
 const int kAoSteps = 128;          // of one ray; beyond, it is open
-const float kAoFirst = 0.5;        // voxels from where rays start to the first look
+const float kAoFirst = 1.0;        // voxels from the surface to the first look, at most
 const float kAoShortest = 0.5;     // voxels: the least step
 const float kAoTrusted = 0.75;     // share of a distance near a surface that a step takes
 
@@ -65,6 +65,12 @@ float ao_reach(vec3 p, vec3 direction) {
     bool beyond = (frame.outside_count != 0u && !concave) || (frame.flags & kFrameUnpruned) != 0u;
     vec3 size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
     return max(t_out, 0.0) + (beyond ? 16.0 * length(size) : 1.0);
+}
+
+// Where a ray from the surface is looked at first: as far off its plane as `off`. A flat one, which would go far to get there, begins raised by what
+// is missing; if all began so high, all would see more of what stands near than the surface does.
+float ao_first(vec3 direction, vec3 normal, float off, float voxel) {
+    return min(off / max(dot(direction, normal), 1e-3), kAoFirst * voxel);
 }
 
 #ifdef KILN_EXACT
@@ -90,14 +96,16 @@ void main() {
             TexelRay ray = pixel_ray(pixel);
             float t_seen = uintBitsToFloat(seen.x);
             float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
-            vec3 from = ray.part + ray.direction * t_seen + normal * ao_offset(state, voxel, t_seen);
+            float off = ao_offset(state, voxel, t_seen);
+            vec3 from = ray.part + ray.direction * t_seen;
             shadow_whole = ray.whole + ivec3(floor(from));
-            vec3 p = from - floor(from);
+            vec3 surface = from - floor(from);
             uint open = 0u;
             uint number = 0u;
             vec3 direction = ao_direction(texel, 0u, normal);
+            float t = ao_first(direction, normal, off, voxel);
+            vec3 p = surface + normal * (off - t * dot(direction, normal));
             float reach = ao_reach(p, direction);
-            float t = kAoFirst * voxel;
             int steps = 0;
             while (number < push.rays) {
                 vec3 f = shadow_field(p + direction * t, direction);
@@ -109,15 +117,16 @@ void main() {
                     if (is_open) open |= 1u << number;
                     ++number;
                     direction = ao_direction(texel, number, normal);
+                    t = ao_first(direction, normal, off, voxel);
+                    p = surface + normal * (off - t * dot(direction, normal));
                     reach = ao_reach(p, direction);
-                    t = kAoFirst * voxel;
                     steps = 0;
                 }
             }
 #ifdef KILN_EXACT
             if (frame.outside_count != 0u && (frame.flags & (kFrameOutsideConcave | kFrameUnpruned)) == kFrameOutsideConcave) {
                 for (uint i = 0u; i < push.rays; ++i) {
-                    if ((open & (1u << i)) != 0u && !above_horizon(p, ao_direction(texel, i, normal))) open &= ~(1u << i);
+                    if ((open & (1u << i)) != 0u && !above_horizon(surface, ao_direction(texel, i, normal))) open &= ~(1u << i);
                 }
             }
 #endif

@@ -57,12 +57,11 @@ void main() {
     float sum = 0.0;
     float weight = 0.0;
     vec2 side = vec2(0.0);  // on which the surface goes on
-    // Beside an edge a second square, moved to where the surface goes on, brings what is missing.
+    // Beside an edge a second square brings what is missing: moved by twice as far as the middle of what is left of the first is off, it is whole.
     for (int i = 0; i < 50; ++i) {
         if (i == 25) {
-            float far = max(abs(side.x), abs(side.y));
-            if (weight > 0.9 * float(kAoPoints * push.rays) || far <= 0.0) break;
-            middle = clamp(middle + round(side / far) * 2.0, vec2(2.0), max(vec2(size) - 3.0, vec2(2.0)));
+            if (weight > 0.97 * float(kAoPoints * push.rays) || weight <= 0.0) break;
+            middle = clamp(middle + 2.0 * float(push.rays) * side / weight, vec2(2.0), max(vec2(size) - 3.0, vec2(2.0)));
         }
         int at = i % 25;
         ivec2 texel = ivec2(ceil(middle - 2.5)) + ivec2(at % 5, at / 5);
