@@ -105,6 +105,15 @@ function(kiln_tests)
         if(name STREQUAL "physics")
             target_include_directories(${target} SYSTEM PRIVATE ${KILN_BULLET_INCLUDE})  # what Bullet itself does with fields
         endif()
+        if(name STREQUAL "physics" AND TARGET kiln_physics_jolt)
+            # Jolt's start-up test as a build has it that read the headers with other options than the library was made with.
+            add_library(kiln_jolt_trap OBJECT ${PROJECT_SOURCE_DIR}/src/physics/jolt/jolt_fault.cpp)
+            target_include_directories(kiln_jolt_trap PRIVATE ${KILN_INCLUDE_ROOTS} ${KILN_PRIVATE_ROOTS})
+            target_compile_definitions(kiln_jolt_trap PRIVATE NDEBUG JPH_PROFILE_ENABLED jolt_fault=jolt_fault_of_other_options)
+            target_link_libraries(kiln_jolt_trap PRIVATE Jolt::Jolt)
+            target_link_libraries(${target} PRIVATE $<TARGET_OBJECTS:kiln_jolt_trap>)
+            set_property(SOURCE ${folder}/jolt_trap_test.cpp APPEND PROPERTY COMPILE_DEFINITIONS KILN_JOLT)
+        endif()
         if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
             # False alarms on the strings of nested designated initialisers, which tests are full of.
             target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)

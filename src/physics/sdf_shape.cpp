@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 
 namespace kiln::physics {
@@ -18,14 +19,25 @@ constexpr int kMassCells = 96;  // along the longest side: the volume of a ball 
 constexpr int kPoints = 1024;   // of a surface, about; a torus then has one every twelfth of its ring's thickness
 constexpr int kGroup = 24;
 constexpr int kBlock = 8;
+constexpr int kTile = 4;
+constexpr float kTileReach =
+    2.1214f;  // cells, from a tile's middle to the farthest of its cells' middles: (kTile - 1) / sqrt(2)
 constexpr size_t kShort = 32;  // instructions: nine points with gradients then cost what they do from bricks
 
 float longest(vec3 v) { return std::max({v.x, v.y, v.z}); }
 
-// Sums of one slab of cells: volume, first and second moments about the middle of the box, and the largest depth.
+// Square of cells of slab k whose lowest is i, j; what the field says in its middle.
+struct Tile {
+    int i, j, k;
+    float distance;
+};
+
+// Sums of one slab of cells: volume, first and second moments about the middle of the box, and the largest depth but for that of tiles that
+// were not looked into.
 struct Sums {
     double v = 0, x = 0, y = 0, z = 0, xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
     float depth = 0;
+    std::vector<Tile> deep;
 };
 
 // The share of a cell below the surface, for a surface that is flat in it.
@@ -40,33 +52,85 @@ struct Grid {
     }
 };
 
+template <typename Fn>
+void each_cell(const Grid& g, const Tile& t, Fn&& fn) {
+    for (int j = t.j; j < std::min(t.j + kTile, g.n[1]); ++j)
+        for (int i = t.i; i < std::min(t.i + kTile, g.n[0]); ++i) fn(i, j);
+}
+
+// Distances in the cells of a slab, x fastest. Where the field says of a tile of cells that all are in air or all are deep, that is enough:
+// infinities; `deep` are the latter.
+std::vector<float> slab_distances(const field::SdfField& field, const Grid& g, int k, std::vector<Tile>& deep) {
+    std::vector<float> out(size_t(g.n[0]) * size_t(g.n[1]), std::numeric_limits<float>::infinity());
+    std::vector<float> x, y, z, d;
+    std::vector<Tile> tiles;
+    const auto ask = [&](float px, float py) { x.push_back(px), y.push_back(py), z.push_back(g.at(2, k)); };
+    const auto answer = [&] {
+        d.resize(x.size());
+        field.distances({x.data(), y.data(), z.data(), int(x.size())}, d.data());
+        x.clear(), y.clear(), z.clear();
+    };
+    for (int j = 0; j < g.n[1]; j += kTile)
+        for (int i = 0; i < g.n[0]; i += kTile) {
+            tiles.push_back({i, j, k, 0});
+            ask(0.5f * (g.at(0, i) + g.at(0, std::min(i + kTile, g.n[0]) - 1)),
+                0.5f * (g.at(1, j) + g.at(1, std::min(j + kTile, g.n[1]) - 1)));
+        }
+    answer();
+    for (size_t t = 0; t < tiles.size(); ++t) tiles[t].distance = d[t];
+    const float reach = kTileReach * g.cell + g.cell;  // 1-Lipschitz: beyond, all cells are covered whole or not at all
+    for (const Tile& t : tiles)
+        if (std::abs(t.distance) <= reach) each_cell(g, t, [&](int i, int j) { ask(g.at(0, i), g.at(1, j)); });
+    answer();
+    size_t next = 0;
+    for (const Tile& t : tiles) {
+        const bool border = std::abs(t.distance) <= reach, inside = !border && t.distance < 0;
+        if (inside) deep.push_back(t);
+        if (!border && !inside) continue;
+        each_cell(g, t, [&](int i, int j) {
+            out[size_t(j) * size_t(g.n[0]) + size_t(i)] = border ? d[next++] : -std::numeric_limits<float>::infinity();
+        });
+    }
+    return out;
+}
+
 Sums sum_slab(const field::SdfField& field, const Grid& g, vec3 middle, int k) {
     Sums s;
-    std::array<float, kBlock * kBlock> x, y, z, d;
-    const float reach = 0.5f * g.cell * std::sqrt(2.0f * kBlock * kBlock + 1.0f) + g.cell;
+    const std::vector<float> d = slab_distances(field, g, k, s.deep);
     for (int j0 = 0; j0 < g.n[1]; j0 += kBlock)
-        for (int i0 = 0; i0 < g.n[0]; i0 += kBlock) {
-            const int i1 = std::min(i0 + kBlock, g.n[0]), j1 = std::min(j0 + kBlock, g.n[1]);
-            const vec3 center{0.5f * (g.at(0, i0) + g.at(0, i1 - 1)), 0.5f * (g.at(1, j0) + g.at(1, j1 - 1)),
-                              g.at(2, k)};
-            if (field.distance(center) > reach) continue;  // 1-Lipschitz: all air
-            int count = 0;
-            for (int j = j0; j < j1; ++j)
-                for (int i = i0; i < i1; ++i, ++count) {
-                    x[size_t(count)] = g.at(0, i), y[size_t(count)] = g.at(1, j), z[size_t(count)] = g.at(2, k);
+        for (int i0 = 0; i0 < g.n[0]; i0 += kBlock)
+            for (int j = j0; j < std::min(j0 + kBlock, g.n[1]); ++j)
+                for (int i = i0; i < std::min(i0 + kBlock, g.n[0]); ++i) {
+                    const float here = d[size_t(j) * size_t(g.n[0]) + size_t(i)];
+                    const double w = cover(here, g.cell);
+                    if (w == 0) continue;
+                    if (std::isfinite(here)) s.depth = std::max(s.depth, -here);
+                    const double px = double(g.at(0, i) - middle.x), py = double(g.at(1, j) - middle.y),
+                                 pz = double(g.at(2, k) - middle.z);
+                    s.v += w, s.x += w * px, s.y += w * py, s.z += w * pz;
+                    s.xx += w * px * px, s.yy += w * py * py, s.zz += w * pz * pz;
+                    s.xy += w * px * py, s.xz += w * px * pz, s.yz += w * py * pz;
                 }
-            field.distances({x.data(), y.data(), z.data(), count}, d.data());
-            for (size_t i = 0; i < size_t(count); ++i) {
-                const double w = cover(d[i], g.cell);
-                if (w == 0) continue;
-                s.depth = std::max(s.depth, -d[i]);
-                const double px = double(x[i] - middle.x), py = double(y[i] - middle.y), pz = double(z[i] - middle.z);
-                s.v += w, s.x += w * px, s.y += w * py, s.z += w * pz;
-                s.xx += w * px * px, s.yy += w * py * py, s.zz += w * pz * pz;
-                s.xy += w * px * py, s.xz += w * px * pz, s.yz += w * py * pz;
-            }
-        }
     return s;
+}
+
+// Of what has this much anyway, and of tiles: none is deeper than its middle and how far its cells are from there.
+float deepest(const field::SdfField& field, const Grid& g, std::vector<Tile> tiles, float depth) {
+    std::sort(tiles.begin(), tiles.end(), [](const Tile& a, const Tile& b) { return a.distance < b.distance; });
+    constexpr size_t kAtOnce = 4;
+    std::array<float, kAtOnce * kTile * kTile> x, y, z, d;
+    for (size_t first = 0; first < tiles.size(); first += kAtOnce) {
+        if (kTileReach * g.cell - tiles[first].distance <= depth) break;
+        size_t count = 0;
+        for (size_t t = first; t < std::min(first + kAtOnce, tiles.size()); ++t)
+            each_cell(g, tiles[t], [&](int i, int j) {
+                x[count] = g.at(0, i), y[count] = g.at(1, j), z[count] = g.at(2, tiles[t].k);
+                ++count;
+            });
+        field.distances({x.data(), y.data(), z.data(), int(count)}, d.data());
+        for (size_t i = 0; i < count; ++i) depth = std::max(depth, -d[i]);
+    }
+    return depth;
 }
 
 quat from_columns(const double (&m)[3][3]) {
@@ -171,7 +235,9 @@ Result<std::shared_ptr<const SdfShape>> SdfShape::moving(std::shared_ptr<const f
         s.v += b.v, s.x += b.x, s.y += b.y, s.z += b.z;
         s.xx += b.xx, s.yy += b.yy, s.zz += b.zz, s.xy += b.xy, s.xz += b.xz, s.yz += b.yz;
         s.depth = std::max(s.depth, b.depth);
+        s.deep.insert(s.deep.end(), b.deep.begin(), b.deep.end());
     }
+    s.depth = deepest(*field, g, std::move(s.deep), s.depth);
     if (!(s.v > 0) || !(s.depth > 0))
         return Error{
             formatted("a body of no volume: nothing in it is solid, or it is thinner than {} m", double(g.cell)),

@@ -9,6 +9,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -220,6 +221,48 @@ TEST(SdfShape, MassCentreAndMomentsAreThoseOfTheFormulas) {
                            : most == m.moments.y ? rotate(m.axes, {0, 1, 0})
                                                  : rotate(m.axes, {0, 0, 1});
     EXPECT_GT(std::abs(dot(axis, principal)), 0.9999f);
+}
+
+// One that counts what it is asked, so that what is deep or far is not asked for cell by cell.
+class Counted final : public field::SdfField {
+public:
+    explicit Counted(std::shared_ptr<const field::SdfField> field) : field_(std::move(field)) {}
+    float distance(vec3 p) const override { return ++asked_, field_->distance(p); }
+    float distance(vec3 p, vec3& gradient) const override { return ++asked_, field_->distance(p, gradient); }
+    void distances(const sdf::Points& points, float* out) const override {
+        asked_ += points.count;
+        field_->distances(points, out);
+    }
+    Box3 bounds() const override { return field_->bounds(); }
+    int asked() const { return asked_; }
+
+private:
+    std::shared_ptr<const field::SdfField> field_;
+    mutable std::atomic<int> asked_ = 0;
+};
+
+TEST(SdfShape, DepthIsThatOfTheDeepestCellAndFewCellsAreAsked) {
+    // A block with a dent, whose deepest place is neither its middle nor anyone's centre of mass; and two balls, of which one is the deeper.
+    const std::vector<std::vector<Edit>> solids{
+        {edit(kiln::Box{.half_extents = {1, 0.8f, 0.9f}}),
+         edit(kiln::Sphere{.radius = 0.7f}, {0, 0.8f, 0}, Op::Subtract)},
+        {edit(kiln::Sphere{.radius = 0.3f}, {-1, 0, 0}), edit(kiln::Sphere{.radius = 0.4f}, {1, 0.2f, 0})}};
+    for (const std::vector<Edit>& edits : solids) {
+        const auto counted = std::make_shared<Counted>(field_of(edits));
+        const auto made = SdfShape::moving(counted);
+        ASSERT_TRUE(made) << made.error().message;
+        const Box3 box = counted->bounds();
+        const vec3 size = box.max - box.min;
+        const float cell = std::max({size.x, size.y, size.z}) / 96;
+        EXPECT_LT(counted->asked(), 0.5f * size.x * size.y * size.z / (cell * cell * cell));
+        // Looked for on a lattice as fine that lies otherwise.
+        float depth = 0;
+        for (float z = box.min.z; z < box.max.z; z += cell)
+            for (float y = box.min.y; y < box.max.y; y += cell)
+                for (float x = box.min.x; x < box.max.x; x += cell)
+                    depth = std::max(depth, -counted->distance({x, y, z}));
+        EXPECT_NEAR((*made)->inner_radius(), depth, cell);
+    }
 }
 
 TEST(SdfShape, SurfacePointsLieOnTheSurfaceAndCoverIt) {
