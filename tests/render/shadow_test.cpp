@@ -90,6 +90,16 @@ double common_area(double r, double s, double d) {
     return r * r * (std::acos(a) - a * std::sqrt(1 - a * a)) + s * s * (std::acos(b) - b * std::sqrt(1 - b * b));
 }
 
+// What is seen of the lamp's disc from (x, 0, 0) beside a plate over x < 0 at height h. Shadow rays start a voxel above the slab.
+double beside_plate(double x, float h, float thickness) {
+    const double height = double(h) - double(kVoxel), far = double(kLightHeight) - double(kVoxel);
+    // The upper edge of the plate hides more than the lower one where the ray leans in.
+    double hidden = 0;
+    for (const double y : {height, height + double(thickness)})
+        hidden = std::max(hidden, 1 - past_edge(x * (1 - y / far) / (double(kLightRadius) * y / far)));
+    return 1 - hidden;
+}
+
 TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
     // The cone is 2.5, 5 and 17 voxels wide at the edge; the last solid has cells without bricks inside.
     for (const auto& [h, thickness] :
@@ -98,21 +108,39 @@ TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
                                      {1.2f, h + thickness + 0.14f, 0.9f});
         std::vector<float> places;
         std::vector<double> expected;
-        // Shadow rays start a voxel above the slab.
         const double height = double(h) - double(kVoxel), far = double(kLightHeight) - double(kVoxel);
         for (const double offset : {-1.3, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.3}) {
             places.push_back(float(offset * double(kLightRadius) * height / (far - height)));
-            // The upper edge of the plate hides more than the lower one where the ray leans in.
-            double hidden = 0;
-            for (const double y : {height, height + double(thickness)}) {
-                const double middle = double(places.back()) * (1 - y / far), radius = double(kLightRadius) * y / far;
-                hidden = std::max(hidden, 1 - past_edge(middle / radius));
-            }
-            expected.push_back(1 - hidden);
+            expected.push_back(beside_plate(double(places.back()), h, thickness));
         }
         const std::vector<float> seen = fractions(world, places);
         for (size_t i = 0; i < places.size(); ++i)
             EXPECT_NEAR(seen[i], expected[i], 0.02 + 0.005) << "edge at height " << h << ", from " << places[i];
+    }
+}
+
+// From where a twentieth of the disc is seen to where a twentieth is hidden: within the published 5 % of what the light and the plate's two edges make.
+TEST_F(ShadowGpu, HalfShadowsAreAsWideAsTheLightMakesThem) {
+    for (const float h : {0.5f, 1.0f, 2.0f}) {
+        const float thickness = 0.06f;
+        const auto world = slab_with("plate", box({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
+                                     {1.2f, h + 0.2f, 0.9f});
+        std::vector<float> places;
+        std::vector<float> expected;
+        for (int i = -70; i <= 70; ++i) {
+            places.push_back(0.02f * float(i) * kLightRadius * h / (kLightHeight - h));
+            expected.push_back(float(beside_plate(double(places.back()), h, thickness)));
+        }
+        const auto width_of = [&](const std::vector<float>& fractions) {
+            const auto place_of = [&](float fraction) {
+                size_t i = 1;
+                while (i + 1 < fractions.size() && fractions[i] < fraction) ++i;
+                const float share = (fraction - fractions[i - 1]) / (fractions[i] - fractions[i - 1]);
+                return double(places[i - 1] + (places[i] - places[i - 1]) * share);
+            };
+            return place_of(0.95f) - place_of(0.05f);
+        };
+        EXPECT_NEAR(width_of(fractions(world, places)) / width_of(expected), 1, 0.05) << "edge at height " << h;
     }
 }
 

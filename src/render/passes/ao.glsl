@@ -50,7 +50,6 @@ layout(constant_id = 5) const bool kAlongCode = true;
 #include "render/passes/ao_rays.glsl"
 
 const int kAoSteps = 128;          // of one ray; beyond, it is open
-const float kAoFirst = 1.0;        // voxels from the surface to the first look, at most
 const float kAoShortest = 0.5;     // voxels: the least step
 const float kAoTrusted = 0.75;     // share of a distance near a surface that a step takes
 
@@ -65,12 +64,6 @@ float ao_reach(vec3 p, vec3 direction) {
     bool beyond = (frame.outside_count != 0u && !concave) || (frame.flags & kFrameUnpruned) != 0u;
     vec3 size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
     return max(t_out, 0.0) + (beyond ? 16.0 * length(size) : 1.0);
-}
-
-// Where a ray from the surface is looked at first: as far off its plane as `off`. A flat one, which would go far to get there, begins raised by what
-// is missing; if all began so high, all would see more of what stands near than the surface does.
-float ao_first(vec3 direction, vec3 normal, float off, float voxel) {
-    return min(off / max(dot(direction, normal), 1e-3), kAoFirst * voxel);
 }
 
 #ifdef KILN_EXACT

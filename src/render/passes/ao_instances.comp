@@ -45,10 +45,13 @@ void main() {
     float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
     if (state == kSeenInstance) voxel = 1.0 / instances[seen.y & 0x0fffffffu].voxels;
     vec3 normal = unpack_unit(point.y);
-    vec3 p = from_eye(ray) + ray.direction * t + normal * ao_offset(state, voxel, t);
+    vec3 surface = from_eye(ray) + ray.direction * t;
+    float off = ao_offset(state, voxel, t);
     uint left = point.x & kAoOpen;
     int number = findLSB(left);
     vec3 direction = ao_direction(texel, uint(number), normal);
+    float first = ao_first(direction, normal, off, voxel);
+    vec3 p = surface + normal * (off - first * dot(direction, normal));
     vec3 inverse = walk_inverse(direction);
     uint at = 0u;
     float enters = 0.0;
@@ -61,7 +64,7 @@ void main() {
             InstanceRecord instance = instances[found];
             here = sets[instance.set];
             TexelRay local = object_ray(instance, p, direction);
-            float begin = 0.5;
+            float begin = first;
             float end = kFarVoxels;
             set_span(local, 0.0, begin, end);
             if (begin <= end && field_march(here.grid, local, begin, end, true).state != kMarchMiss) {
@@ -73,6 +76,8 @@ void main() {
             left &= left - 1u;
             number = max(findLSB(left), 0);
             direction = ao_direction(texel, uint(number), normal);
+            first = ao_first(direction, normal, off, voxel);
+            p = surface + normal * (off - first * dot(direction, normal));
             inverse = walk_inverse(direction);
             at = 0u;
         }

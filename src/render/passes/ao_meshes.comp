@@ -32,22 +32,38 @@ layout(push_constant) uniform Push { AoPush push; };
 
 const float kFarMetres = 1e7;
 
+ivec2 texel;
+vec3 normal;
+uint open;   // of the rays, a bit each
+uint ray_of_walk;
+
+// The next open ray from `ray_of_walk` on.
+bool aim_ray(inout vec3 d) {
+    uint left = open & (kAoOpen << ray_of_walk);
+    if (left == 0u) return false;
+    ray_of_walk = uint(findLSB(left));
+    d = ao_direction(texel, ray_of_walk, normal);
+    return true;
+}
+
+bool next_mesh_ray(MeshWalkHit met, inout vec3 d) {
+    if (met.triangle != kNoTriangle) open &= ~(1u << ray_of_walk);
+    ++ray_of_walk;
+    return aim_ray(d);
+}
+
 void main() {
-    ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
+    texel = ivec2(gl_GlobalInvocationID.xy);
     if (texel.x * int(push.every) >= frame.tile_width || texel.y * int(push.every) >= frame.tile_height) return;
     uvec4 point = texelFetch(points_before, texel, 0);
-    if ((point.x & kAoOpen) == 0u) {
-        imageStore(ao_points, texel, point);
-        return;
+    open = point.x & kAoOpen;
+    if (open != 0u) {
+        ivec2 pixel = ao_pixel(texel);
+        normal = unpack_unit(point.y);
+        ShadowStart start = shadow_start(texelFetch(visibility, pixel, 0), pixel_ray(pixel), normal);
+        ray_of_walk = 0u;
+        vec3 d;
+        if (aim_ray(d)) walk_meshes(start.from, d, kFarMetres, MeshWalk(false, true, start.part, start.triangle));
     }
-    ivec2 pixel = ao_pixel(texel);
-    vec3 normal = unpack_unit(point.y);
-    ShadowStart start = shadow_start(texelFetch(visibility, pixel, 0), pixel_ray(pixel), normal);
-    MeshWalk wanted = MeshWalk(false, true, start.part, start.triangle);
-    for (uint i = 0u; i < push.rays; ++i) {
-        if ((point.x & (1u << i)) == 0u) continue;
-        MeshWalkHit hit = walk_meshes(start.from, ao_direction(texel, i, normal), kFarMetres, wanted);
-        if (hit.triangle != kNoTriangle) point.x &= ~(1u << i);
-    }
-    imageStore(ao_points, texel, point);
+    imageStore(ao_points, texel, uvec4((point.x & ~kAoOpen) | open, point.yzw));
 }

@@ -46,6 +46,7 @@ shared uint branch_count;
 shared uvec2 leaves[kMostLeaves];  // part; first triangle << 3 | count
 shared uint leaf_count;
 shared uint leaves_with_holes[2];  // a bit each
+shared uint leaves_that_hide[2];   // likewise: leaf_triangles is not 0
 shared uint leaf_triangles[kMostLeaves];  // a bit for each of a leaf's triangles that may hide something of a point of the workgroup
 shared float leaf_boxes[6u * kMostLeaves];                // low, high, counted from the eye
 shared float leaf_places[9u * kInLeaf * kMostLeaves];     // corners of their triangles
@@ -193,6 +194,8 @@ void next_leaves() {
         leaf_count = 0u;
         leaves_with_holes[0] = 0u;
         leaves_with_holes[1] = 0u;
+        leaves_that_hide[0] = 0u;
+        leaves_that_hide[1] = 0u;
         tile_open = 0u;
     }
     barrier();
@@ -221,8 +224,11 @@ void next_leaves() {
             p[corner] = mesh_point(part, vertex_position(mesh_corner(part, (leaf.y >> 3u) + i % kInLeaf, corner)));
             for (uint axis = 0u; axis < 3u; ++axis) leaf_places[9u * i + 3u * corner + axis] = p[corner][axis];
         }
-        if ((frame.flags & kFrameAccelerate) == 0u || may_hide(part.flags, p[0], p[1], p[2]))
-            atomicOr(leaf_triangles[i / kInLeaf], 1u << (i % kInLeaf));
+        if ((frame.flags & kFrameAccelerate) == 0u || may_hide(part.flags, p[0], p[1], p[2])) {
+            uint which = i / kInLeaf;
+            atomicOr(leaf_triangles[which], 1u << (i % kInLeaf));
+            atomicOr(leaves_that_hide[which >> 5u], 1u << (which & 31u));
+        }
     } while (round < kInLeaf * leaf_count);
     barrier();
 }

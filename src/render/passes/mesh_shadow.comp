@@ -283,10 +283,14 @@ void cover_leaves(Disc disc, uvec2 todo, uvec2 later, bool holes) {
 void cover_chunk(Disc disc, Reach cone, Reach middle) {
     uvec2 todo = uvec2(0u);
     uvec2 later = uvec2(0u);
-    for (uint i = 0u; i < leaf_count; ++i) {
+    uvec2 left = uvec2(leaves_that_hide[0], leaves_that_hide[1]);
+    while ((left.x | left.y) != 0u) {
+        bool first_word = left.x != 0u;
+        uint i = first_word ? uint(findLSB(left.x)) : 32u + uint(findLSB(left.y));
+        left = first_word ? uvec2(left.x & (left.x - 1u), left.y) : uvec2(0u, left.y & (left.y - 1u));
         vec3 low = vec3(leaf_boxes[6u * i], leaf_boxes[6u * i + 1u], leaf_boxes[6u * i + 2u]);
         vec3 high = vec3(leaf_boxes[6u * i + 3u], leaf_boxes[6u * i + 4u], leaf_boxes[6u * i + 5u]);
-        uint bit = leaf_triangles[i] != 0u && may_meet(cone, low, high) ? 1u << (i & 31u) : 0u;
+        uint bit = may_meet(cone, low, high) ? 1u << (i & 31u) : 0u;
         bool behind = may_meet(middle, low, high);
         uvec2 bits = i < 32u ? uvec2(bit, 0u) : uvec2(0u, bit);
         todo |= behind ? bits : uvec2(0u);
@@ -350,7 +354,7 @@ void main() {
         bool more = false;
         do {
             next_leaves();
-            if (open && leaf_count != 0u) {
+            if (open && (leaves_that_hide[0] | leaves_that_hide[1]) != 0u) {
                 cover_chunk(disc, cone, middle);
                 open = !all_covered;
             }

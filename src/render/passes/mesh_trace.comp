@@ -29,6 +29,8 @@ layout(push_constant) uniform Push { MeshTracePush push; };
 
 const float kFarMetres = 1e7;
 
+bool next_mesh_ray(MeshWalkHit met, inout vec3 d) { return false; }
+
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (pixel.x >= frame.tile_width || pixel.y >= frame.tile_height) return;

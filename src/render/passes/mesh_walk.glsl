@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Triangles of meshes along a ray, through the parts' trees of boxes. The including kernel has mesh.glsl and mesh_textures.glsl and declares first
-// what they want, and MeshSurface mesh_surfaces[], MeshNode nodes[].
+// Triangles of meshes along rays, through the parts' trees of boxes. The including kernel has mesh.glsl and mesh_textures.glsl and declares first
+// what they want, and MeshSurface mesh_surfaces[], MeshNode nodes[]; and behind this file next_mesh_ray().
 
 const uint kNoTriangle = 0xffffffffu;
 
@@ -41,7 +41,10 @@ float opacity_at(MeshPart part, uint triangle, vec3 w) {
     return alpha;
 }
 
-// Metres from the eye; up to t_last. Of equals the first. kNoTriangle: nothing.
+// Called at a ray's end with what it met. False: that was the last; else the direction of the next one, from the same place.
+bool next_mesh_ray(MeshWalkHit met, inout vec3 d);
+
+// Metres from the eye; up to t_last. Of equals the first. kNoTriangle: nothing. What the last ray met is returned.
 MeshWalkHit walk_meshes(vec3 from, vec3 d, float t_last, MeshWalk wanted) {
     MeshWalkHit hit = MeshWalkHit(t_last, 0u, kNoTriangle);
     vec3 inverse = inverse_of(d);
@@ -50,7 +53,8 @@ MeshWalkHit walk_meshes(vec3 from, vec3 d, float t_last, MeshWalk wanted) {
     uint next_part = 0u;  // of a leaf of the parts' tree
     uint end_part = 0u;
     bool more = true;
-    // Loops are nested as in march.gpu.h: all go on to a part that they meet; in it to a triangle that they meet; then all look for its holes.
+    // Loops are nested as in march.gpu.h: all go on to a part that they meet; in it to a triangle that they meet; then all look for its holes. Rays
+    // that follow one another are one loop, so that those in step wait for each other once and not at every ray's end.
     while (more) {
         uint which = 0u;
         bool found = false;
@@ -65,7 +69,12 @@ MeshWalkHit walk_meshes(vec3 from, vec3 d, float t_last, MeshWalk wanted) {
                 end_part = next_part + (meets_it ? box.leaf & 7u : 0u);
                 i = meets_it ? i + 1u : box.skip;
             } else {
-                more = false;
+                more = next_mesh_ray(hit, d);
+                if (more) {
+                    inverse = inverse_of(d);
+                    hit = MeshWalkHit(t_last, 0u, kNoTriangle);
+                    i = 0u;
+                }
             }
         } while (more && !found);
         MeshPart part = mesh_parts[which];
@@ -108,8 +117,11 @@ MeshWalkHit walk_meshes(vec3 from, vec3 d, float t_last, MeshWalk wanted) {
             bool holes = (part.flags & (kMeshBlend | kMeshMask)) == kMeshMask;
             if (candidate && !(holes && opacity_at(part, triangle - 1u, w) < mesh_surfaces[part.surface].alpha_cutoff)) {
                 hit = MeshWalkHit(t, which, triangle - 1u);
-                in_part = in_part && !wanted.any;
-                more = more && !wanted.any;
+                if (wanted.any) {  // to the ray's end
+                    in_part = false;
+                    next_part = end_part;
+                    i = top;
+                }
             }
         }
     }
