@@ -68,8 +68,7 @@ SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, float t_last, bool acce
         // Traversal on GPUs", 2009).
         uint found = next_leaf(at, from, inverse, nearest.t, enters, nearest.cells);
         if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
+        InstanceRecord instance = instance_at(found);
         // Beyond the nearest by more than a voxel is long: no voxel with a nearer hit is cut short, so each hit has its bits whatever was found
         // before, and of equals the lower number is found.
         float t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 + 2.0 : kFarVoxels;

@@ -11,20 +11,19 @@
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
-layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3) uniform utexture2D instance_nodes;
-layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
-layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 7, std430) readonly buffer Lights { LightRecord lights[]; };
-layout(set = 0, binding = 8) uniform texture3D distances;
-layout(set = 0, binding = 9) uniform sampler distance_sampler;
-layout(set = 0, binding = 10) uniform utexture2D visibility;
-layout(set = 0, binding = 11) uniform utexture2D surface_words;
-layout(set = 0, binding = 12) uniform utexture2D fractions_before;
-layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visible_fractions;
-layout(set = 0, binding = 14, std430) readonly buffer LightMasks { uint light_masks[]; };
+layout(set = 0, binding = 1) uniform utexture2D instance_ways;
+layout(set = 0, binding = 2) uniform utexture2D instance_nodes;
+layout(set = 0, binding = 3, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Lights { LightRecord lights[]; };
+layout(set = 0, binding = 7) uniform texture3D distances;
+layout(set = 0, binding = 8) uniform sampler distance_sampler;
+layout(set = 0, binding = 9) uniform utexture2D visibility;
+layout(set = 0, binding = 10) uniform utexture2D surface_words;
+layout(set = 0, binding = 11) uniform utexture2D fractions_before;
+layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 13, std430) readonly buffer LightMasks { uint light_masks[]; };
 layout(push_constant) uniform Push { InstancePush push; };
 
 #define KILN_INSTANCE_WALK
@@ -82,8 +81,7 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
         // To the next leaf first, as in march_sets.glsl.
         uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
         if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
+        InstanceRecord instance = instance_at(found);
         TexelRay ray = object_ray(instance, p, l);
         float scale = instance.voxels;
         if (tan_radius <= 0.0) {
@@ -124,7 +122,7 @@ void main() {
         TexelRay ray = pixel_ray(pixel);
         float t = uintBitsToFloat(seen.x);
         float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
-        if (state == kSeenInstance) voxel = 1.0 / instances[seen.y & 0x0fffffffu].voxels;
+        if (state == kSeenInstance) voxel = 1.0 / instance_voxels(seen.y & 0x0fffffffu);
         vec3 p = from_eye(ray) + ray.direction * t + surface.normal * shadow_offset(state, voxel, t);
         vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * frame.grid.voxel_size;
         LightWalk walk = light_walk(pixel, push.first_light);
