@@ -54,18 +54,28 @@ void main() {
     int looks = 0;
     InstanceNode leaf = node_at(0u);
     while (left != 0u) {
-        uint found = next_in_tree(at, p, direction, inverse, 0.0, kFarVoxels, leaf, enters, looks);
-        bool ends = found == kNoInstance;
-        if (!ends) {
-            InstanceRecord instance = instance_at(found);
-            TexelRay local = object_ray(instance, p, direction);
-            float begin = 0.5;
-            float end = kFarVoxels;
-            set_span(local, 0.0, begin, end);
-            if (begin <= end && field_march(here.grid, local, begin, end, true).state != kMarchMiss) {
-                point.x &= ~(1u << number);
-                ends = true;
+        // To the next object in whose turned box the ray comes, since marches cost most, and rays in step wait for each other.
+        InstanceRecord instance;
+        TexelRay local;
+        float begin = 0.0;
+        float end = 0.0;
+        bool meets = false;
+        bool ends = false;
+        do {
+            uint found = next_in_tree(at, p, direction, inverse, 0.0, kFarVoxels, leaf, enters, looks);
+            ends = found == kNoInstance;
+            if (!ends) {
+                instance = instance_at(found);
+                local = object_ray(instance, p, direction);
+                begin = 0.5;
+                end = kFarVoxels;
+                set_span(local, 0.0, begin, end);
+                meets = begin <= end;
             }
+        } while (!ends && !meets);
+        if (meets && field_march(here.grid, local, begin, end, true).state != kMarchMiss) {
+            point.x &= ~(1u << number);
+            ends = true;
         }
         if (ends) {
             left &= left - 1u;

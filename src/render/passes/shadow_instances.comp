@@ -78,34 +78,45 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
     int looks = 0;
     InstanceNode leaf = node_at(0u);
     while (true) {
-        // To the next leaf first, as in march_sets.glsl.
-        uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
-        if (found == kNoInstance) break;
-        InstanceRecord instance = instance_at(found);
-        TexelRay ray = object_ray(instance, p, l);
-        float scale = instance.voxels;
+        // To the next object in whose turned box the cone comes first, as in march_sets.glsl.
+        TexelRay ray;
+        float first = 0.0;
+        float last = 0.0;
+        bool meets = false;
+        bool ends = false;
+        do {
+            uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
+            ends = found == kNoInstance;
+            if (!ends) {
+                InstanceRecord instance = instance_at(found);
+                ray = object_ray(instance, p, l);
+                float scale = instance.voxels;
+                first = 0.5;
+                last = t_last * scale;
+                float by = 0.0;
+                if (tan_radius > 0.0) {
+                    // From where the cone comes near to where it is past; rays to the rim are longer by a little.
+                    vec3 low = vec3(leaf.low_x, leaf.low_y, leaf.low_z);
+                    vec3 high = vec3(leaf.high_x, leaf.high_y, leaf.high_z);
+                    float along = dot(0.5 * (low + high) - p, l);
+                    float radius = 0.5 * length(high - low);
+                    float longer = 1.0 + tan_radius;
+                    first = max(0.5, (along - radius) * scale / longer - 1.0);
+                    last = min(t_last, (along + radius) * longer) * scale + 1.0;
+                    // Where no ray of the cone meets it nothing is hidden; the distances that are stored lie by up to a voxel.
+                    by = last * tan_radius * longer + 1.0;
+                }
+                set_span(ray, by, first, last);
+                meets = first <= last;
+            }
+        } while (!ends && !meets);
+        if (ends) break;
         if (tan_radius <= 0.0) {
-            float begin = 0.5;
-            float end = t_last * scale;
-            set_span(ray, 0.0, begin, end);
-            if (begin > end) continue;
-            MarchHit hit = field_march(here.grid, ray, begin, end, true);
-            if (hit.state != kMarchMiss) return 0.0;
+            if (field_march(here.grid, ray, first, last, true).state != kMarchMiss) return 0.0;
             continue;
         }
-        // From where the cone comes near to where it is past; rays to the rim are longer by a little.
-        vec3 low = vec3(leaf.low_x, leaf.low_y, leaf.low_z);
-        vec3 high = vec3(leaf.high_x, leaf.high_y, leaf.high_z);
-        float along = dot(0.5 * (low + high) - p, l);
-        float radius = 0.5 * length(high - low);
-        float longer = 1.0 + tan_radius;
-        float first = max(0.5, (along - radius) * scale / longer - 1.0);
-        float last = min(t_last, (along + radius) * longer) * scale + 1.0;
-        // Where no ray of the cone meets it nothing is hidden; the distances that are stored lie by up to a voxel.
-        set_span(ray, last * tan_radius * longer + 1.0, first, last);
-        if (first > last) continue;
         shadow_whole = ray.whole;
-        visible *= shadow_visible(ray.part, ray.direction, tan_radius, ShadowMarch(first, max(last, first), 0.25, kSaturatedVoxels, kShadowSteps));
+        visible *= shadow_visible(ray.part, ray.direction, tan_radius, ShadowMarch(first, last, 0.25, kSaturatedVoxels, kShadowSteps));
         if (visible <= 0.0) return 0.0;
     }
     return visible;
