@@ -33,6 +33,7 @@ layout(push_constant) uniform Push { AoPush push; };
 const float kFarMetres = 1e7;
 
 void main() {
+    ao_make_directions();
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     if (texel.x * int(push.every) >= frame.tile_width || texel.y * int(push.every) >= frame.tile_height) return;
     uvec4 point = texelFetch(points_before, texel, 0);

@@ -10,8 +10,19 @@ ivec2 ao_pixel(ivec2 texel) { return min(texel * int(push.every), ivec2(frame.ti
 // and from higher up more is hidden by what stands near.
 float ao_offset(uint state, float voxel, float t) { return 0.5 * (state == kSeenOutside ? shadow_offset(state, voxel, t) : voxel); }
 
+// Directions of the rays of all points of a square, around +Z: a workgroup makes them once, since software makes what stands in a loop in every turn.
+shared vec3 ao_directions[kAoPoints * kAoMostRays];
+
+// All threads of the workgroup come here, before they ask for a direction.
+void ao_make_directions() {
+    for (uint i = gl_LocalInvocationIndex; i < kAoPoints * push.rays; i += uint(kTileGroup * kTileGroup))
+        ao_directions[i] = ao_local_direction((push.picture & (kAoPictures - 1u)) * kAoPoints * push.rays + i, push.rays);
+    barrier();
+}
+
+// Of a ray of a point. Beyond the last of a point it is that one's.
 vec3 ao_direction(ivec2 texel, uint ray, vec3 normal) {
-    vec3 d = ao_local_direction(ao_number(texel.x, texel.y, push.picture, push.rays, ray), push.rays);
+    vec3 d = ao_directions[ao_number(texel.x, texel.y, 0u, push.rays, min(ray, push.rays - 1u))];
     Basis basis = basis_around(normal);
     return basis.tangent * d.x + basis.bitangent * d.y + normal * d.z;
 }
