@@ -166,7 +166,7 @@ Result<void> GpuInstances::write_tables() {
     std::vector<field::BrickRecord> records;
     std::vector<sdf::Instruction> code;
     std::vector<float> numbers;
-    std::vector<InstanceSet> table;
+    table_.clear();
     const uint32_t end = field_->atlas_slots();
     use_ = {0, 0, 0, 1};
     for (const auto& bricks : order_) {
@@ -193,7 +193,7 @@ Result<void> GpuInstances::write_tables() {
         numbers.insert(numbers.end(), program.samples.begin(), program.samples.end());
         set.params_first = uint32_t(numbers.size());
         numbers.insert(numbers.end(), program.params.begin(), program.params.end());
-        table.push_back(set);
+        table_.push_back(set);
         use_ = both(use_, tape_use(program.tape()));
     }
     if (runner_->device().info().kind != rhi::DeviceKind::Cpu) use_ = any_kind(use_);
@@ -201,7 +201,7 @@ Result<void> GpuInstances::write_tables() {
     if (auto r = buffer_of(brick_records_, "instance bricks", std::as_bytes(std::span(records))); !r) return r;
     if (auto r = buffer_of(code_, "instance code", std::as_bytes(std::span(code))); !r) return r;
     if (auto r = buffer_of(numbers_, "instance numbers", std::as_bytes(std::span(numbers))); !r) return r;
-    return buffer_of(set_table_, "instance sets", std::as_bytes(std::span(table)));
+    return buffer_of(set_table_, "instance sets", std::as_bytes(std::span(table_)));
 }
 
 void GpuInstances::place(std::span<const Instance> instances, const FrameParams& frame,
@@ -264,12 +264,13 @@ void GpuInstances::place(std::span<const Instance> instances, const FrameParams&
     place_ms_ = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
 
-// Things as large as a node, as an image of nodes.
-static Image upload_nodes(Graph& graph, std::string_view name, std::span<const std::byte> bytes) {
-    const size_t row = kNodesARow * sizeof(InstanceNode), rows = (bytes.size() + row - 1) / row;
+// As an image with rows of so many bytes.
+static Image upload_rows(Graph& graph, std::string_view name, size_t row, std::span<const std::byte> bytes) {
+    constexpr size_t kTexel = 16;
+    const size_t rows = (bytes.size() + row - 1) / row;
     std::vector<std::byte> whole(rows * row);
     std::memcpy(whole.data(), bytes.data(), bytes.size());
-    const rhi::Extent size{2 * kNodesARow, uint32_t(rows)};
+    const rhi::Extent size{uint32_t(row / kTexel), uint32_t(rows)};
     Image out = graph.create(std::string(name), {.size = size, .format = rhi::Format::Rgba32Uint});
     const CopyRegion all[] = {{.size = size}};
     graph.copy(graph.upload(std::string(name), std::span<const std::byte>(whole)), out, all);
@@ -280,13 +281,22 @@ InstanceHandles GpuInstances::import(Graph& graph) const {
     InstanceHandles out;
     if (nodes_.empty() && glass_nodes_.empty()) return out;
     out.instances = graph.upload("instances", std::span<const InstanceRecord>(records_));
-    if (!nodes_.empty()) out.nodes = upload_nodes(graph, "instance tree", std::as_bytes(std::span(nodes_)));
+    std::vector<InstanceWay> ways;
+    ways.reserve(records_.size());
+    for (const InstanceRecord& r : records_) {
+        const InstanceSet& set = table_[r.set];
+        ways.push_back({r.x, r.y, r.z, r.eye_x, r.eye_y, r.eye_z, r.voxels, set.grid, set.slot_first, set.cells_first,
+                        set.low_x, set.low_y, set.low_z, set.high_x, set.high_y, set.high_z});
+    }
+    out.ways = upload_rows(graph, "instance ways", kWaysARow * sizeof(InstanceWay), std::as_bytes(std::span(ways)));
+    constexpr size_t kNodeRow = kNodesARow * sizeof(InstanceNode);
+    if (!nodes_.empty()) out.nodes = upload_rows(graph, "instance tree", kNodeRow, std::as_bytes(std::span(nodes_)));
     if (!glass_nodes_.empty()) {
         std::vector<std::byte> tree(glass_nodes_.size() * sizeof(InstanceNode) + glass_.size() * sizeof(GlassRecord));
         std::memcpy(tree.data(), glass_nodes_.data(), glass_nodes_.size() * sizeof(InstanceNode));
         std::memcpy(tree.data() + glass_nodes_.size() * sizeof(InstanceNode), glass_.data(),
                     glass_.size() * sizeof(GlassRecord));
-        out.glass_nodes = upload_nodes(graph, "glass tree", tree);
+        out.glass_nodes = upload_rows(graph, "glass tree", kNodeRow, tree);
         out.glass = graph.upload("glass", std::span<const GlassRecord>(glass_));
     }
     out.sets = graph.import("instance sets", set_table_);

@@ -26,6 +26,7 @@ struct InstanceHandles {
     Buffer glass;  // GlassRecord of every instance
     // The trees, kNodesARow nodes a row; behind that of things that light goes through, those records again.
     Image nodes, glass_nodes;
+    Image ways;  // of every instance, kWaysARow a row
     uint32_t node_count = 0;
     uint32_t glass_node_count = 0;
     TapeUse use;  // of the sets' code
@@ -88,6 +89,7 @@ private:
     rhi::RangeAllocator reserve_{0};
     uint64_t atlas_number_ = 0;
     bool tables_stale_ = true;
+    std::vector<InstanceSet> table_;  // of order_
     rhi::BufferHandle cells_, code_, numbers_, brick_records_, set_table_;
     std::vector<InstanceRecord> records_;
     std::vector<InstanceNode> nodes_, glass_nodes_;

@@ -181,6 +181,40 @@ TEST(ClipmapSlow, AFlightMakesNoMoreThanItsShellsInAnyFrame) {
     map.work();
     map.work();
     for (int level = 0; level < 6; ++level) EXPECT_EQ(map.counts(level).cells_made, 0u) << "a steady camera";
+    EXPECT_EQ(baked(map), 0u) << "a steady camera";
+}
+
+// 3 km of a hundred thousand things: what a frame bakes and what stays in memory depend on the levels, not on how far one has come.
+TEST(ClipmapSlow, AHundredThousandEditsOverKilometresFlyInBoundedFramesAndMemory) {
+    constexpr uint32_t kBudget = 512;
+    worlds::Random r(8);
+    std::vector<Edit> edits{worlds::edit(Plane{})};
+    while (edits.size() < 100000) {
+        const vec3 at{r.in(-1500, 1500), r.in(-1, 1), r.in(-1500, 1500)};
+        edits.push_back(worlds::edit(Sphere{.radius = r.in(0.5f, 4)}, at, r.below(3) == 0 ? Op::Subtract : Op::Union));
+    }
+    Clipmap map = made(worlds::compiled(edits), {-400, 1.5, 0.1}, {.voxel_size = 0.05f, .levels = 8, .cells = 32});
+    map.work();
+    const uint32_t bricks = map.bricks(), slots = map.slot_count();
+    const size_t code = map.code().size();
+    uint32_t most_bricks = 0, most_slots = 0;
+    size_t most_code = 0;
+    double x = -400;
+    for (int frame = 0; frame < 1200; ++frame) {
+        x += (frame < 240 ? 10.0 : frame < 640 || frame >= 1040 ? 300.0 : -300.0) / 60;
+        map.move({x, 1.5, 0.1});
+        map.work({.bricks = kBudget});
+        ASSERT_LE(baked(map), kBudget) << "frame " << frame;
+        if (frame % 20 == 0) {
+            ASSERT_EQ(holes(map), 0) << "frame " << frame;
+        }
+        most_bricks = std::max(most_bricks, map.bricks());
+        most_slots = std::max(most_slots, map.slot_count());
+        most_code = std::max(most_code, map.code().size());
+    }
+    EXPECT_LE(most_bricks, bricks * 5 / 4);
+    EXPECT_LE(most_slots, slots * 5 / 4);
+    EXPECT_LE(most_code, code * 5 / 2);
 }
 
 }  // namespace

@@ -50,6 +50,7 @@ TEST(Clipmap, MovingMakesTheCellsOfTheShellsAndNothingElse) {
         }
         map.work();
         for (int level = 0; level < 4; ++level) EXPECT_EQ(map.counts(level).cells_made, 0u) << "steady";
+        EXPECT_EQ(baked(map), 0u) << "steady";
     }
     expect_is_its_program(map, "after the walk");
     for (int level = 0; level < 4; ++level) expect_true_words(map, level);

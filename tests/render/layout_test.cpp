@@ -122,18 +122,24 @@ TEST(Layout, RecordsInBuffersAreTheSame) {
     for (uint32_t i = 0; i < 22; ++i) set.push_back(i * 4);
     EXPECT_EQ(AT(InstanceSet, samples_first), 52u);
     EXPECT_EQ(AT(InstanceSet, high_z), 76u);
-    expect_array(kMarchInstances, 9, set, sizeof(InstanceSet));
+    expect_array(kResolveInstances, 2, set, sizeof(InstanceSet));
     std::vector<uint32_t> instance;
     for (uint32_t i = 0; i < 6; ++i) instance.push_back(i * 16);
     for (uint32_t i = 0; i < 8; ++i) instance.push_back(AT(InstanceRecord, eye_x) + i * 4);
     EXPECT_EQ(AT(InstanceRecord, before_x), 48u);
     EXPECT_EQ(AT(InstanceRecord, material), 116u);
-    expect_array(kMarchInstances, 8, instance, sizeof(InstanceRecord));
+    expect_array(kResolveInstances, 1, instance, sizeof(InstanceRecord));
     // Two texels of an image: node_at() in instances.glsl.
     EXPECT_EQ(AT(InstanceNode, skip), 12u);
     EXPECT_EQ(AT(InstanceNode, high_x), 16u);
     EXPECT_EQ(AT(InstanceNode, instance), 28u);
     EXPECT_EQ(sizeof(InstanceNode), 32u);
+    // Eight: instance_at() there.
+    EXPECT_EQ(AT(InstanceWay, eye_x), 48u);
+    EXPECT_EQ(AT(InstanceWay, grid), 64u);
+    EXPECT_EQ(AT(InstanceWay, slot_first), 96u);
+    EXPECT_EQ(AT(InstanceWay, high_x), 116u);
+    EXPECT_EQ(sizeof(InstanceWay), 128u);
     expect_array(kMeshCull, 3, {0, 4, 8, 12, 16, 20}, sizeof(MeshBox));
     expect_array(kMeshPack, 0, {0, 4}, sizeof(MeshClusterRef));
     expect_array(kShadow, 3, light, sizeof(LightRecord));

@@ -62,9 +62,8 @@ Buffer occlude(Graph& g, const TileInputs& in, Surface& surface) {
     if (i) {
         Image left = g.create("ao points", {.size = size, .format = rhi::Format::Rgba32Uint});
         g.dispatch(kAoInstances, size,
-                   {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-                    g.read(in.rays), g.read(f.tables), g.read(f.distances), g.read(surface.seen), g.read(points),
-                    g.write(left)},
+                   {g.uniform(in.frame), g.read(i.ways), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
+                    g.read(f.tables), g.read(f.distances), g.read(surface.seen), g.read(points), g.write(left)},
                    push);
         points = left;
     }

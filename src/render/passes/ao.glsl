@@ -75,7 +75,7 @@ bool above_horizon(vec3 p, vec3 direction) {
 
 void main() {
     if (gl_LocalInvocationIndex == 0u) group_evaluations = 0u;
-    barrier();
+    ao_make_directions();
     ivec2 texel = ivec2(gl_GlobalInvocationID.xy);
     uint looks = 0u;
     if (texel.x * int(push.every) < frame.tile_width && texel.y * int(push.every) < frame.tile_height) {

@@ -53,6 +53,7 @@ bool next_mesh_ray(MeshWalkHit met, inout vec3 d) {
 }
 
 void main() {
+    ao_make_directions();
     texel = ivec2(gl_GlobalInvocationID.xy);
     if (texel.x * int(push.every) >= frame.tile_width || texel.y * int(push.every) >= frame.tile_height) return;
     uvec4 point = texelFetch(points_before, texel, 0);

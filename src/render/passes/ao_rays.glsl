@@ -18,8 +18,19 @@ float ao_first(vec3 direction, vec3 normal, float off, float voxel) {
     return min(off / max(dot(direction, normal), 1e-3), kAoFirst * voxel);
 }
 
+// Directions of the rays of all points of a square, around +Z: a workgroup makes them once, since software makes what stands in a loop in every turn.
+shared vec3 ao_directions[kAoPoints * kAoMostRays];
+
+// All threads of the workgroup come here, before they ask for a direction.
+void ao_make_directions() {
+    for (uint i = gl_LocalInvocationIndex; i < kAoPoints * push.rays; i += uint(kTileGroup * kTileGroup))
+        ao_directions[i] = ao_local_direction((push.picture & (kAoPictures - 1u)) * kAoPoints * push.rays + i, push.rays);
+    barrier();
+}
+
+// Of a ray of a point. Beyond the last of a point it is that one's.
 vec3 ao_direction(ivec2 texel, uint ray, vec3 normal) {
-    vec3 d = ao_local_direction(ao_number(texel.x, texel.y, push.picture, push.rays, ray), push.rays);
+    vec3 d = ao_directions[ao_number(texel.x, texel.y, 0u, push.rays, min(ray, push.rays - 1u))];
     Basis basis = basis_around(normal);
     return basis.tangent * d.x + basis.bitangent * d.y + normal * d.z;
 }

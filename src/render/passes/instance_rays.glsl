@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Rays and points of a frame in the voxels of an instance's object. The including kernel declares first: FrameParams frame,
-// InstanceRecord instances[], InstanceSet sets[].
+// Rays and points of a frame in the voxels of an instance's object. The including kernel declares first: FrameParams frame.
 
 #include "field/cubic.gpu.h"
 

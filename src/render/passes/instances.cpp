@@ -34,9 +34,9 @@ void shadow_instances(Graph& g, const TileInputs& in, const Image& visibility, c
     if (!i || in.light_count == 0) return;
     Image both = g.create("visible fractions", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kShadowInstances, in.size,
-               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-                g.read(in.rays), g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances),
-                g.read(visibility), g.read(surface.words), g.read(fractions), g.write(both), g.read(light_masks)},
+               {g.uniform(in.frame), g.read(i.ways), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
+                g.read(in.field.tables), g.read(in.lights), g.sampled(in.field.distances), g.read(visibility),
+                g.read(surface.words), g.read(fractions), g.write(both), g.read(light_masks)},
                InstancePush{.node_count = i.node_count, .first_light = first_light, .by_tree = 0, .pad_0 = 0});
     fractions = both;
 }

@@ -34,6 +34,16 @@ struct InstanceRecord {
     uint pad_0, pad_1;
 };
 
+// What a ray that comes to an instance asks of it and of its set (128 bytes).
+struct InstanceWay {
+    vec4 x, y, z;  // as of the record
+    int eye_x, eye_y, eye_z;
+    float voxels;
+    GridParams grid;  // as of the set
+    uint slot_first, cells_first;
+    float low_x, low_y, low_z, high_x, high_y, high_z;
+};
+
 // A node of the tree (32 bytes), in the order of a walk that looks at the nearer child first: the next is the node that follows, or,
 // where the box is missed, the one at `skip`.
 struct InstanceNode {
@@ -43,8 +53,10 @@ struct InstanceNode {
     uint instance;  // of a leaf; kNoInstance: it has children
 };
 KILN_CONST uint kNoInstance = 0xffffffffu;
-// Kernels read nodes from an image, two texels a node, so many nodes a row: a software device fetches a texel at once, and a buffer word by word.
+// Rays read nodes and ways from images, two texels a node and eight a way, so many a row: a software device fetches a texel at once, and a buffer word by
+// word.
 KILN_CONST uint kNodesARow = 1024u;
+KILN_CONST uint kWaysARow = 256u;
 
 struct InstancePush {
     uint node_count;
@@ -60,6 +72,6 @@ KILN_CONST uint kInstanceSlotShift = 9u;
 
 #ifdef __cplusplus
 static_assert(sizeof(InstanceSet) == 88 && sizeof(InstanceRecord) == 128 && sizeof(InstanceNode) == 32 &&
-              sizeof(InstancePush) == 16);
+              sizeof(InstanceWay) == 128 && sizeof(InstancePush) == 16);
 }  // namespace kiln::render
 #endif

@@ -44,7 +44,7 @@ Visibility march(Graph& g, const TileInputs& in, const Image* mesh_depth) {
         if (in.levels) uses.push_back(g.uniform(in.levels_block));
         if (in.has_instances) {
             const InstanceHandles& i = in.instances;
-            uses.insert(uses.end(), {g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells)});
+            uses.insert(uses.end(), {g.read(i.ways), g.read(i.nodes), g.read(i.cells)});
             g.dispatch(march_kernel(in), in.size, uses,
                        InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = i.by_tree, .pad_0 = 0});
         } else {

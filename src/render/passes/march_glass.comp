@@ -11,15 +11,14 @@
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
-layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3) uniform utexture2D instance_nodes;  // of glass
-layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
-layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 7) uniform texture3D distances;
-layout(set = 0, binding = 8) uniform utexture2D seen_before;
-layout(set = 0, binding = 9, rgba32ui) writeonly uniform uimage2D visibility;
+layout(set = 0, binding = 1) uniform utexture2D instance_ways;
+layout(set = 0, binding = 2) uniform utexture2D instance_nodes;  // of glass
+layout(set = 0, binding = 3, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 6) uniform texture3D distances;
+layout(set = 0, binding = 7) uniform utexture2D seen_before;
+layout(set = 0, binding = 8, rgba32ui) writeonly uniform uimage2D visibility;
 layout(push_constant) uniform Push { InstancePush push; };
 
 // A ray that starts inside has the surface it came by behind it, by less than the bricks' own error.
@@ -39,8 +38,7 @@ void main() {
     float within = (frame.flags & kFrameRays) != 0u ? rays[pixel.y * frame.tile_width + pixel.x].within : 0.0;
     if (within > 0.0) {
         uint index = uint(within) - 1u;
-        InstanceRecord instance = instances[index];
-        here = sets[instance.set];
+        InstanceRecord instance = instance_at(index);
         MarchHit hit = field_march(here.grid, object_ray(instance, from, ray.direction), kPastVoxels, kFarVoxels, true);
         float t = hit.state == kMarchMiss ? 0.0 : hit.t / instance.voxels;
         if (t < uintBitsToFloat(seen.x)) {
@@ -66,8 +64,7 @@ void main() {
             if (meets) found = node.instance;
         }
         if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
+        InstanceRecord instance = instance_at(found);
         // A little beyond the nearest, so that of equals the lower number is found.
         float t_end = nearest < kFarVoxels ? nearest * instance.voxels * 1.000001 : kFarVoxels;
         MarchHit hit = field_march(here.grid, object_ray(instance, from, ray.direction), 0.0, t_end, true);

@@ -64,19 +64,28 @@ SetHit march_sets(TexelRay ray, vec3 from, vec3 inverse, float t_last, bool acce
     uint at = 0u;
     float enters = 0.0;
     while (true) {
-        // To the next leaf first, so that rays that are in step march together (Aila and Laine, "Understanding the Efficiency of Ray
-        // Traversal on GPUs", 2009).
-        uint found = next_leaf(at, from, inverse, nearest.t, enters, nearest.cells);
-        if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
-        // Beyond the nearest by more than a voxel is long: no voxel with a nearer hit is cut short, so each hit has its bits whatever was found
-        // before, and of equals the lower number is found.
-        float t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 + 2.0 : kFarVoxels;
-        TexelRay local = object_ray(instance, from, ray.direction);
+        // To the next object in whose turned box the ray comes first, so that rays that are in step march together (Aila and Laine, "Understanding the
+        // Efficiency of Ray Traversal on GPUs", 2009).
+        uint found = kNoInstance;
+        InstanceRecord instance;
+        TexelRay local;
         float t_begin = 0.0;
-        set_span(local, 0.0, t_begin, t_end);
-        if (t_begin > t_end) continue;
+        float t_end = 0.0;
+        bool meets = false;
+        do {
+            found = next_leaf(at, from, inverse, nearest.t, enters, nearest.cells);
+            if (found != kNoInstance) {
+                instance = instance_at(found);
+                local = object_ray(instance, from, ray.direction);
+                // Beyond the nearest by more than a voxel is long: no voxel with a nearer hit is cut short, so each hit has its bits whatever was
+                // found before, and of equals the lower number is found.
+                t_begin = 0.0;
+                t_end = nearest.t < kFarVoxels ? nearest.t * instance.voxels * 1.000001 + 2.0 : kFarVoxels;
+                set_span(local, 0.0, t_begin, t_end);
+                meets = t_begin <= t_end;
+            }
+        } while (found != kNoInstance && !meets);
+        if (!meets) break;
         MarchHit hit = set_march(here.grid, local, t_begin, t_end, accelerate);
         nearest.cells += hit.cells;
         nearest.voxels += hit.voxels;

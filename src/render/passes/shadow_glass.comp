@@ -15,18 +15,17 @@ layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
 layout(set = 0, binding = 1, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 2, std430) readonly buffer Lights { LightRecord lights[]; };
 layout(set = 0, binding = 3, std430) readonly buffer LightMasks { uint light_masks[]; };
-layout(set = 0, binding = 4, std430) readonly buffer Instances { InstanceRecord instances[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 6) uniform utexture2D instance_nodes;  // of glass; then the GlassRecord of every instance
-layout(set = 0, binding = 7, std430) readonly buffer Cells { uint instance_cells[]; };
-layout(set = 0, binding = 8, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 9) uniform texture3D distances;
-layout(set = 0, binding = 10) uniform utexture2D visibility;
-layout(set = 0, binding = 11) uniform utexture2D surface_words;
-layout(set = 0, binding = 12) uniform utexture2D fractions_before;
-layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visible_fractions;
-layout(set = 0, binding = 14, rgba32ui) writeonly uniform uimage2D tints_low;
-layout(set = 0, binding = 15, rgba32ui) writeonly uniform uimage2D tints_high;
+layout(set = 0, binding = 4) uniform utexture2D instance_ways;
+layout(set = 0, binding = 5) uniform utexture2D instance_nodes;  // of glass; then the GlassRecord of every instance
+layout(set = 0, binding = 6, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 7, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 8) uniform texture3D distances;
+layout(set = 0, binding = 9) uniform utexture2D visibility;
+layout(set = 0, binding = 10) uniform utexture2D surface_words;
+layout(set = 0, binding = 11) uniform utexture2D fractions_before;
+layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D tints_low;
+layout(set = 0, binding = 14, rgba32ui) writeonly uniform uimage2D tints_high;
 layout(push_constant) uniform Push { InstancePush push; };
 
 #define KILN_FROM_INSIDE
@@ -138,8 +137,7 @@ void main() {
         search.left = vec3(1.0);
         uint found = next_glass(p, p_world);
         while (found != kNoInstance) {
-            InstanceRecord instance = instances[found];
-            here = sets[instance.set];
+            InstanceRecord instance = instance_at(found);
             // Off the surface by as much as its own bricks may be wrong.
             TexelRay way = object_ray(instance, p + n * (1.0 / instance.voxels), search.light.l);
             float t_last = search.light.distance / frame.grid.voxel_size;

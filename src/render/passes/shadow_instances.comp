@@ -11,20 +11,19 @@
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
-layout(set = 0, binding = 1, std430) readonly buffer Instances { InstanceRecord instances[]; };
-layout(set = 0, binding = 2, std430) readonly buffer Sets { InstanceSet sets[]; };
-layout(set = 0, binding = 3) uniform utexture2D instance_nodes;
-layout(set = 0, binding = 4, std430) readonly buffer Cells { uint instance_cells[]; };
-layout(set = 0, binding = 5, std430) readonly buffer Rays { FrameRay rays[]; };
-layout(set = 0, binding = 6, std430) readonly buffer Tables { uint tables[]; };
-layout(set = 0, binding = 7, std430) readonly buffer Lights { LightRecord lights[]; };
-layout(set = 0, binding = 8) uniform texture3D distances;
-layout(set = 0, binding = 9) uniform sampler distance_sampler;
-layout(set = 0, binding = 10) uniform utexture2D visibility;
-layout(set = 0, binding = 11) uniform utexture2D surface_words;
-layout(set = 0, binding = 12) uniform utexture2D fractions_before;
-layout(set = 0, binding = 13, rgba32ui) writeonly uniform uimage2D visible_fractions;
-layout(set = 0, binding = 14, std430) readonly buffer LightMasks { uint light_masks[]; };
+layout(set = 0, binding = 1) uniform utexture2D instance_ways;
+layout(set = 0, binding = 2) uniform utexture2D instance_nodes;
+layout(set = 0, binding = 3, std430) readonly buffer Cells { uint instance_cells[]; };
+layout(set = 0, binding = 4, std430) readonly buffer Rays { FrameRay rays[]; };
+layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };
+layout(set = 0, binding = 6, std430) readonly buffer Lights { LightRecord lights[]; };
+layout(set = 0, binding = 7) uniform texture3D distances;
+layout(set = 0, binding = 8) uniform sampler distance_sampler;
+layout(set = 0, binding = 9) uniform utexture2D visibility;
+layout(set = 0, binding = 10) uniform utexture2D surface_words;
+layout(set = 0, binding = 11) uniform utexture2D fractions_before;
+layout(set = 0, binding = 12, rgba32ui) writeonly uniform uimage2D visible_fractions;
+layout(set = 0, binding = 13, std430) readonly buffer LightMasks { uint light_masks[]; };
 layout(push_constant) uniform Push { InstancePush push; };
 
 #define KILN_INSTANCE_WALK
@@ -79,35 +78,45 @@ float visible_past_instances(vec3 p, vec3 l, float tan_radius, float t_last) {
     int looks = 0;
     InstanceNode leaf = node_at(0u);
     while (true) {
-        // To the next leaf first, as in march_sets.glsl.
-        uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
-        if (found == kNoInstance) break;
-        InstanceRecord instance = instances[found];
-        here = sets[instance.set];
-        TexelRay ray = object_ray(instance, p, l);
-        float scale = instance.voxels;
+        // To the next object in whose turned box the cone comes first, as in march_sets.glsl.
+        TexelRay ray;
+        float first = 0.0;
+        float last = 0.0;
+        bool meets = false;
+        bool ends = false;
+        do {
+            uint found = next_in_tree(at, p, l, inverse, tan_radius, t_last, leaf, enters, looks);
+            ends = found == kNoInstance;
+            if (!ends) {
+                InstanceRecord instance = instance_at(found);
+                ray = object_ray(instance, p, l);
+                float scale = instance.voxels;
+                first = 0.5;
+                last = t_last * scale;
+                float by = 0.0;
+                if (tan_radius > 0.0) {
+                    // From where the cone comes near to where it is past; rays to the rim are longer by a little.
+                    vec3 low = vec3(leaf.low_x, leaf.low_y, leaf.low_z);
+                    vec3 high = vec3(leaf.high_x, leaf.high_y, leaf.high_z);
+                    float along = dot(0.5 * (low + high) - p, l);
+                    float radius = 0.5 * length(high - low);
+                    float longer = 1.0 + tan_radius;
+                    first = max(0.5, (along - radius) * scale / longer - 1.0);
+                    last = min(t_last, (along + radius) * longer) * scale + 1.0;
+                    // Where no ray of the cone meets it nothing is hidden; the distances that are stored lie by up to a voxel.
+                    by = last * tan_radius * longer + 1.0;
+                }
+                set_span(ray, by, first, last);
+                meets = first <= last;
+            }
+        } while (!ends && !meets);
+        if (ends) break;
         if (tan_radius <= 0.0) {
-            float begin = 0.5;
-            float end = t_last * scale;
-            set_span(ray, 0.0, begin, end);
-            if (begin > end) continue;
-            MarchHit hit = field_march(here.grid, ray, begin, end, true);
-            if (hit.state != kMarchMiss) return 0.0;
+            if (field_march(here.grid, ray, first, last, true).state != kMarchMiss) return 0.0;
             continue;
         }
-        // From where the cone comes near to where it is past; rays to the rim are longer by a little.
-        vec3 low = vec3(leaf.low_x, leaf.low_y, leaf.low_z);
-        vec3 high = vec3(leaf.high_x, leaf.high_y, leaf.high_z);
-        float along = dot(0.5 * (low + high) - p, l);
-        float radius = 0.5 * length(high - low);
-        float longer = 1.0 + tan_radius;
-        float first = max(0.5, (along - radius) * scale / longer - 1.0);
-        float last = min(t_last, (along + radius) * longer) * scale + 1.0;
-        // Where no ray of the cone meets it nothing is hidden; the distances that are stored lie by up to a voxel.
-        set_span(ray, last * tan_radius * longer + 1.0, first, last);
-        if (first > last) continue;
         shadow_whole = ray.whole;
-        visible *= shadow_visible(ray.part, ray.direction, tan_radius, ShadowMarch(first, max(last, first), 0.25, kSaturatedVoxels, kShadowSteps));
+        visible *= shadow_visible(ray.part, ray.direction, tan_radius, ShadowMarch(first, last, 0.25, kSaturatedVoxels, kShadowSteps));
         if (visible <= 0.0) return 0.0;
     }
     return visible;
@@ -124,7 +133,7 @@ void main() {
         TexelRay ray = pixel_ray(pixel);
         float t = uintBitsToFloat(seen.x);
         float voxel = state == kSeenBrick ? float(1u << (seen.z >> kSeenLevelShift)) : 1.0;
-        if (state == kSeenInstance) voxel = 1.0 / instances[seen.y & 0x0fffffffu].voxels;
+        if (state == kSeenInstance) voxel = 1.0 / instance_voxels(seen.y & 0x0fffffffu);
         vec3 p = from_eye(ray) + ray.direction * t + surface.normal * shadow_offset(state, voxel, t);
         vec3 p_world = (vec3(ray.whole) + (ray.part + ray.direction * t)) * frame.grid.voxel_size;
         LightWalk walk = light_walk(pixel, push.first_light);

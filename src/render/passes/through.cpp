@@ -280,8 +280,8 @@ Image march_glass(Graph& g, const TileInputs& in, const Image& solid) {
     const InstanceHandles& i = in.instances;
     Image out = g.create("visibility with glass", {.size = in.size, .format = rhi::Format::Rgba32Uint});
     g.dispatch(kMarchGlass, in.size,
-               {g.uniform(in.frame), g.read(i.instances), g.read(i.sets), g.read(i.nodes), g.read(i.cells),
-                g.read(in.rays), g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out)},
+               {g.uniform(in.frame), g.read(i.ways), g.read(i.nodes), g.read(i.cells), g.read(in.rays),
+                g.read(in.field.tables), g.read(in.field.distances), g.read(solid), g.write(out)},
                InstancePush{.node_count = i.node_count, .first_light = 0, .by_tree = 0, .pad_0 = 0});
     return out;
 }
@@ -319,10 +319,10 @@ std::vector<Image> shadow_glass(Graph& g, const TileInputs& in, const Image& vis
     for (int k = 0; k < 2; ++k)
         tints.push_back(g.create("glass tints", {.size = in.size, .format = rhi::Format::Rgba32Uint}));
     g.dispatch(kShadowGlass, in.size,
-               {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(light_masks), g.read(i.instances),
-                g.read(i.sets), g.read(i.glass_nodes), g.read(i.cells), g.read(in.field.tables),
-                g.read(in.field.distances), g.read(visibility), g.read(surface.words), g.read(fractions), g.write(left),
-                g.write(tints[0]), g.write(tints[1])},
+               {g.uniform(in.frame), g.read(in.rays), g.read(in.lights), g.read(light_masks), g.read(i.ways),
+                g.read(i.glass_nodes), g.read(i.cells), g.read(in.field.tables), g.read(in.field.distances),
+                g.read(visibility), g.read(surface.words), g.read(fractions), g.write(left), g.write(tints[0]),
+                g.write(tints[1])},
                InstancePush{.node_count = i.glass_node_count, .first_light = first_light, .by_tree = 0, .pad_0 = 0});
     fractions = left;
     return tints;
