@@ -2,6 +2,7 @@
 // Starts threads.
 // Clipmaps against the exact program: bounds, seams, rays, and places far out.
 #include "clipmaps.h"
+#include "rounds.h"
 
 #include <algorithm>
 #include <array>
@@ -247,6 +248,7 @@ TEST(Clipmap, IsExactAHundredKilometresFromTheOrigin) {
             each_cell(map.window(level), [&](ivec3 c) {
                 const uint32_t word = map.cell_word(level, c);
                 if ((word & kCellOccupied) == 0 || (level > 0 && c.y != 0 && (c.x + c.z) % 5 != 0)) return;
+                if ((c.x + 3 * c.y + c.z) % (4 / rounds(4)) != 0) return;
                 const BrickContent& brick = map.content(word & kCellSlotMask);
                 EXPECT_EQ(map.records()[word & kCellSlotMask].far, 1u);
                 bool near = false;
@@ -266,7 +268,7 @@ TEST(Clipmap, IsExactAHundredKilometresFromTheOrigin) {
                 EXPECT_TRUE(near);
                 own += near;
             });
-            EXPECT_GT(own, level == 0 ? 150 : 50);
+            EXPECT_GT(own, (level == 0 ? 150 : 50) * rounds(4) / 4);
             EXPECT_LE(worst, 0.002) << "level " << level << ", " << texels
                                     << " texels";  // half a step of a half is 2^-10
         }
