@@ -109,6 +109,30 @@ bool BrickEvaluator::keeps_away(std::span<const sdf::Instruction> edit, ivec3 fi
     return sdf::keeps_away(sdf::view(*program_, edit), x_, y_, z_, from);
 }
 
+BrickContent BrickEvaluator::joined(std::span<const sdf::Instruction> value, ivec3 first, const HalfCodes& held,
+                                    bool cut, uint16_t only, float near) {
+    place(first);
+    (void)sdf::evaluate_brick(sdf::view(*program_, value), x_, y_, z_, distances_.data());
+    BrickContent out;
+    HalfCodes& brick = out.half.renew();
+    std::array<Slice, 8> solid;
+    sdf::store_halves(distances_, cut ? -voxels_per_metre_ : voxels_per_metre_, kBandVoxels, kHalfStepVoxels,
+                      brick.codes.data(), solid.data());
+    // Codes of sign and size as whole numbers in the same order, and back; there is no negative 0.
+    const auto turned = [](int16_t code) { return int16_t(code ^ (code >> 15 & 0x7fff)); };
+    int16_t least = 0x7fff;
+    for (size_t i = 0; i < brick.codes.size(); ++i) {
+        const int16_t a = turned(int16_t(held.codes[i])), b = turned(int16_t(brick.codes[i]));
+        const int16_t code = turned(cut ? std::max(a, b) : std::min(a, b));
+        brick.codes[i] = uint16_t(code);
+        least = std::min(least, int16_t(code & 0x7fff));
+    }
+    if (!(half_value(uint32_t(least)) < near)) return {};
+    out.solid_box = solid_voxels(solid_texels(std::as_bytes(std::span(brick.codes)).data(), 2), brick.solid);
+    out.material = only;
+    return out;
+}
+
 BrickContent BrickEvaluator::content(DistanceFormat format, uint16_t only) const {
     BrickContent out;
     if (format == DistanceFormat::Half) {

@@ -92,6 +92,11 @@ public:
     bool keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from);
     /// Of the last evaluate(): what is stored. `only`: the material of all texels, or kSeveralMaterials where one does not know.
     BrickContent content(DistanceFormat format, uint16_t only = sdf::kSeveralMaterials) const;
+    /// What the brick that begins at `first` holds once an edit that blends with nothing has joined what it holds: the least of both at each
+    /// texel; `cut`: the greatest of what it holds and the edit's negative. `value`: the edit's, moved to R0. `only`: the material of all
+    /// texels. Empty where no texel comes to be nearer to the surface than `near` voxels: the world is to say whether there is a brick.
+    BrickContent joined(std::span<const sdf::Instruction> value, ivec3 first, const HalfCodes& held, bool cut,
+                        uint16_t only, float near);
 
 private:
     void place(ivec3 first);

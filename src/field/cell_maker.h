@@ -65,9 +65,10 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 ///     void empty(ivec3 cell, bool inside)
 ///     bool keeps(ivec3 cell, Inserted, ListCuller::Start)    it is as it was
 /// and, of run_box() alone,
-///     StillCells look(const CellMaker&)           of the cells centres() are of
+///     StillCells look(const CellMaker&, uint64_t changing)    of the cells centres() are of, a bit each: those that an edit may change
 ///     bool is_empty(ivec3 cell)                   as it was
 ///     bool texels_stay(ivec3 cell, CellMaker&)    it has a brick, with another code but the same texels, and has taken it
+///     bool texels_join(ivec3 cell, CellMaker&)    likewise, but has other texels, which follow from those it had
 ///     void brick(ivec3 cell, CellMaker&)    append_code(), evaluator() and only_material() are its
 enum class Inserted : uint8_t {
     Shows,    ///< one of the edits that came is in the code of the cell
@@ -275,7 +276,7 @@ void CellMaker::run_cells(Sink& sink) {
     const uint64_t shown = inserted_.empty() ? 0 : culler_.balls_with(cells_, inserted_);
     const uint64_t no_effect = kWholeList ? culler_.balls_unchanged_by(cells_, inserted_) : 0;
     StillCells still;
-    if constexpr (kWholeList) still = sink.look(*this);
+    if constexpr (kWholeList) still = sink.look(*this, open & ~no_effect);
     for (int i = 0; i < 64; ++i) {
         if ((open >> i & 1u) == 0) continue;
         const Inserted inserted = (no_effect >> i & 1u) != 0 ? Inserted::NoEffect
@@ -290,6 +291,7 @@ void CellMaker::run_cells(Sink& sink) {
         has_material_ = false;
         if constexpr (kWholeList) {
             if ((still.ask >> i & 1u) != 0 && sink.texels_stay(cell_[i], *this)) continue;
+            if (sink.texels_join(cell_[i], *this)) continue;
         }
         if (evaluate(cell_[i])) {
             sink.brick(cell_[i], *this);

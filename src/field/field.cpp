@@ -163,38 +163,55 @@ private:
         bool is_empty(ivec3 cell) const {
             return (builder.old_->cells_.at(cell.x, cell.y, cell.z) & kCellOccupied) == 0;
         }
-        StillCells look(const CellMaker& maker) {
+        StillCells look(const CellMaker& maker, uint64_t changing) {
             if (!saw_rows) still->see(maker.rows());
             saw_rows = true;
             StillCells out = still->look(maker.centres(), maker.values());
-            uint64_t left = builder.stored_ != nullptr ? out.ask & maker.centres().live : 0;
-            for (out.ask = 0; left != 0; left &= left - 1) {
+            if (builder.stored_ == nullptr) return {out.empty, 0};
+            const uint64_t ask = out.ask & maker.centres().live;
+            out.ask = 0;
+            for (uint64_t left = ask | (still->joins() ? changing : 0); left != 0; left &= left - 1) {
                 const int ball = std::countr_zero(left);
                 const BrickContent* const brick = stored(maker.cell(ball));
                 if (brick == nullptr || !brick->half) continue;
-                out.ask |= left & -left;
+                out.ask |= ask & left & -left;
                 // Codes come from far away: all are asked for before the first is looked at.
                 const auto* const codes = reinterpret_cast<const std::byte*>(brick->half->codes.data());
                 for (size_t at = 0; at < sizeof brick->half->codes; at += 64) __builtin_prefetch(codes + at);
             }
             return out;
         }
-        bool texels_stay(ivec3 cell, CellMaker& maker) {
+        ivec3 first_texel(ivec3 cell) const {
             const ivec3 world = cell + builder.first_cell();
-            const ivec3 texel{world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels};
-            if (!still->hold(cell, texel, *stored(cell), maker.only_material(), maker.evaluator())) return false;
-            maker.emit_code();
-            const uint32_t first = uint32_t(result.code.size());
+            return {world.x * kBrickVoxels, world.y * kBrickVoxels, world.z * kBrickVoxels};
+        }
+        void keep(ivec3 cell, const CellMaker& maker, bool bake, BrickContent content) {
+            Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), bake, std::move(content)};
             maker.append_code(result.code);
-            result.leaves.push_back({cell, first, maker.code_count(), false, {}});
+            result.leaves.push_back(std::move(leaf));
+        }
+        bool texels_stay(ivec3 cell, CellMaker& maker) {
+            if (!still->hold(cell, first_texel(cell), *stored(cell), maker.only_material(), maker.evaluator()))
+                return false;
+            maker.emit_code();
+            keep(cell, maker, false, {});
+            return true;
+        }
+        bool texels_join(ivec3 cell, CellMaker& maker) {
+            if (!still->joins() || builder.stored_ == nullptr || builder.made_ == nullptr) return false;
+            const BrickContent* const brick = stored(cell);
+            if (brick == nullptr) return false;
+            BrickContent content = still->joined(first_texel(cell), *brick, maker.only_material(), maker.evaluator());
+            if (!content) return false;
+            maker.emit_code();
+            keep(cell, maker, true, std::move(content));
             return true;
         }
         void brick(ivec3 cell, CellMaker& maker) {
-            Leaf leaf{cell, uint32_t(result.code.size()), maker.code_count(), true, {}};
+            BrickContent content;
             if (builder.made_ != nullptr)
-                leaf.content = maker.evaluator().content(builder.options_.format, maker.only_material());
-            maker.append_code(result.code);
-            result.leaves.push_back(std::move(leaf));
+                content = maker.evaluator().content(builder.options_.format, maker.only_material());
+            keep(cell, maker, true, std::move(content));
         }
     };
 

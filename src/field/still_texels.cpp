@@ -38,9 +38,7 @@ StillCells StillTexels::look(const sdf::Balls& centres, const float* values) con
     const float voxels = 1 / voxel_size_;
     for (size_t i = 0; i < changes_.size(); ++i) {
         if (margins_[i] == kInfinite) return {};
-        const std::span<const sdf::Instruction> code =
-            std::span(code_).subspan(code_first_[i], code_first_[i + 1] - code_first_[i]);
-        sdf::evaluate(sdf::view(*program_, code), {centres.x, centres.y, centres.z, 64}, edit);
+        sdf::evaluate(sdf::view(*program_, code_of(i)), {centres.x, centres.y, centres.z, 64}, edit);
         const float sign = program_->edits[changes_[i].row].op == Op::Union ? 1.0f : -1.0f;
         const float floor = changes_[i].gone ? -kInfinite : -kBandVoxels, above = margins_[i] + kGuardVoxels;
         const float beyond = (own_voxels_ + margins_[i]) * voxel_size_ + centres.radius;
@@ -59,16 +57,22 @@ StillCells StillTexels::look(const sdf::Balls& centres, const float* values) con
 
 void StillTexels::see(std::span<const uint32_t> rows) {
     margins_.clear();
+    joins_ = false;
     for (const Change& change : changes_) {
         const sdf::EditSpan& edit = program_->edits[change.row];
         sdf::BlendAllowance later;
+        bool alike = true;  // what is later, and the edit
         for (const uint32_t row : rows) {
-            if (change.anywhere || program_->edits[row].order > edit.order) later.add(program_->edits[row].reach);
+            const sdf::EditSpan& other = program_->edits[row];
+            if (!change.anywhere && other.order <= edit.order) continue;
+            later.add(other.reach);
+            alike = alike && other.op == edit.op && other.reach == 0;
         }
         for (const Change& other : changes_) {
             if (other.gone && other.row != change.row) later.add(program_->edits[other.row].reach);
         }
         const bool moves_one_way = edit.op == Op::Union || edit.op == Op::Subtract;
+        joins_ = changes_.size() == 1 && !change.gone && moves_one_way && edit.reach == 0 && alike;
         margins_.push_back(moves_one_way ? (edit.reach + later.metres()) / voxel_size_ + kRounding : kInfinite);
     }
 }
@@ -86,6 +90,13 @@ bool StillTexels::hold(ivec3 cell, ivec3 first_texel, const BrickContent& brick,
         if (!evaluator.keeps_away(program_->code.subspan(edit.first, edit.count - 1), first_texel, from)) return false;
     }
     return true;
+}
+
+BrickContent StillTexels::joined(ivec3 first_texel, const BrickContent& brick, uint16_t only,
+                                 BrickEvaluator& evaluator) const {
+    if (!brick.half || only == sdf::kSeveralMaterials) return {};
+    const bool cut = program_->edits[changes_[0].row].op == Op::Subtract;
+    return evaluator.joined(code_of(0), first_texel, *brick.half, cut, only, own_voxels_ - kRounding);
 }
 
 }  // namespace kiln::field

@@ -222,23 +222,35 @@ static BrickLeaf fused_leaf(const BrickPoints& points, const uint32_t* code, siz
     }
 }
 
+// The eight numbers of a row, again and again, from lane `first` of a slice on; and of each row its own number. A brick's rows have just been
+// written, four numbers or one at a time: what asks for more at once waits until they have reached the cache.
+#if defined(KILN_LANES) && KILN_LANES == 16
+static inline real row_from(const float* row, int) {
+    typedef float four __attribute__((vector_size(16)));
+    four low, high;
+    __builtin_memcpy(&low, row, sizeof low);
+    __builtin_memcpy(&high, row + 4, sizeof high);
+    const auto one = __builtin_shufflevector(low, high, 0, 1, 2, 3, 4, 5, 6, 7);
+    return lane_f(__builtin_shufflevector(one, one, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
+}
+static inline real rows_from(const float* each, int first) {
+    typedef float eight __attribute__((vector_size(32)));
+    const eight one = eight{} + each[first / 8], next = eight{} + each[first / 8 + 1];
+    return lane_f(__builtin_shufflevector(one, next, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15));
+}
+#else
+static inline real row_from(const float* row, int first) { return load(row + first % 8); }
+static inline real rows_from(const float* each, int first) { return real(param(each[first / 8])); }
+#endif
+
 static void place_brick(BrickPoints& points, const float* x, const float* y, const float* z) {
-    alignas(64) float row_x[kChunkPoints], row_y[kChunkPoints];
-    for (int j = 0; j < 8; ++j) {
-        __builtin_memcpy(row_x + 8 * j, x, 8 * sizeof(float));
-        for (int i = 0; i < 8; ++i) row_y[8 * j + i] = y[j];
-    }
     for (int i = 0; i < kSliceVectors; ++i) {
-        points.x[i] = load(row_x + i * kBrickLanes);
-        points.y[i] = load(row_y + i * kBrickLanes);
+        points.x[i] = row_from(x, i * kBrickLanes);
+        points.y[i] = rows_from(y, i * kBrickLanes);
     }
     for (int slice = 0; slice < kBrickSlices; ++slice) points.z[slice] = param(z[slice]);
 #ifdef KILN_PRODUCTS
-    __builtin_memcpy(row_y, z, 8 * sizeof(float));
-    __builtin_memcpy(row_y + 8, z, 8 * sizeof(float));
-    mask plain = both(is_plain(points.x[0]), is_plain(load(row_y)));
-    for (int i = 0; i < kSliceVectors; ++i) plain = both(plain, is_plain(points.y[i]));
-    points.plain = all_of(plain);
+    points.plain = all_of(both(is_plain(points.x[0]), both(is_plain(row_from(y, 0)), is_plain(row_from(z, 0)))));
 #else
     points.plain = true;
 #endif

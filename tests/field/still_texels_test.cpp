@@ -88,6 +88,40 @@ TEST(StillTexels, HollowsUnderASurfaceAreWhatARebuildHas) {
     }
 }
 
+// Edits that blend with nothing come last, or before others: bricks are made of what they held where all later ones are of their kind.
+TEST(StillTexels, WhatJoinsABrickIsWhatARebuildHas) {
+    for (const float own : {1.0f, 4.0f}) {
+        worlds::Random r(own > 1 ? 5 : 4);
+        worlds::World world{
+            "lumps",
+            {},
+            {.voxel_size = 0.03f, .bounds = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}, .own_voxels = own}};
+        world.edits.push_back(worlds::edit(Sphere{.radius = 0.5f}, {}));
+        worlds::Live live(world.edits);
+        HostBricks host = *HostBricks::build(live.program(), world.options);
+        uint64_t joined = 0;
+        for (int step = 0; step < rounds(60); ++step) {
+            std::vector<Edit>& edits = world.edits;
+            if (edits.size() > 24) edits.erase(edits.begin() + 1, edits.begin() + 13);
+            const Op op = r.below(2) == 0 ? Op::Union : Op::Subtract;
+            Edit came = worlds::edit(Sphere{.radius = r.in(0.02f, 0.2f)}, normalize(r.point(1)) * r.in(0.3f, 0.6f), op,
+                                     r.below(8) == 0 ? 0.05f : 0.0f);
+            if (r.below(2) == 0) came.node.shape = Box{.half_extents = {0.1f, r.in(0.01f, 0.2f), 0.05f}};
+            size_t at = edits.size();
+            while (at > 1 && (r.below(3) != 0) && (edits[at - 1].op == op || r.below(4) == 0)) --at;
+            edits.insert(edits.begin() + ptrdiff_t(at), came);
+            const std::vector<RowChange> changes = live.become(edits);
+            const BuildStats without = (*Field::update(host.field(), live.program(), changes))->stats();
+            ASSERT_TRUE(host.update(live.program(), changes));
+            const BuildStats& with = host.field().stats();
+            const uint64_t stayed = without.bricks_baked - with.bricks_baked;
+            joined += without.cells_evaluated - with.cells_evaluated - stayed;
+            ASSERT_EQ(host.hash(), HostBricks::bake(world.field()).hash()) << "own " << own << " step " << step;
+        }
+        EXPECT_GT(joined, 0u) << "own " << own;
+    }
+}
+
 // Between two balls that blend so widely that cells far from both become solid.
 TEST(StillTexels, EmptyCellsThatABlendFillsAreNotPassedOver) {
     worlds::World world{"bridge", {}, {.voxel_size = 0.03f, .bounds = {{-0.9f, -0.5f, -0.5f}, {0.9f, 0.5f, 0.5f}}}};
