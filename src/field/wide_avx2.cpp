@@ -20,8 +20,14 @@ static inline F min(F a, F b) { return (F)_mm256_min_ps((__m256)b, (__m256)a); }
 static inline F max(F a, F b) { return (F)_mm256_max_ps((__m256)b, (__m256)a); }
 static inline F floor(F a) { return (F)_mm256_floor_ps((__m256)a); }
 static inline F sqrt(F a) { return (F)_mm256_sqrt_ps((__m256)a); }
+template <int kScale = 1>
 static inline I gather_bytes(const void* base, I index) {
-    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, 1);
+    return (I)_mm256_i32gather_epi32(static_cast<const int*>(base), (__m256i)index, kScale);
+}
+template <int kScale>
+static inline I gather_bytes(M m, const void* base, I index, I others) {
+    return (I)_mm256_mask_i32gather_epi32((__m256i)others, static_cast<const int*>(base), (__m256i)index, (__m256i)m,
+                                          kScale);
 }
 static inline uint32_t bits(M m) { return uint32_t(_mm256_movemask_ps((__m256)m)); }
 static inline int count(M m) { return __builtin_popcount(bits(m)); }
@@ -52,6 +58,8 @@ static inline I gather_from(const Pointers& p) {
     const auto* const base = reinterpret_cast<const int*>(ptrdiff_t(kBytes));
     return (I)_mm256_set_m128i(_mm256_i64gather_epi32(base, p.high, 1), _mm256_i64gather_epi32(base, p.low, 1));
 }
+
+static inline I floor_to_int(F a) { return to_int(floor(a)); }
 
 #include "field/wide_math.inl"
 

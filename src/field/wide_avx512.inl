@@ -14,6 +14,7 @@ static inline M le(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_LE_OQ)
 static inline M eq(F a, F b) { return _mm512_cmp_ps_mask(f(a), f(b), _CMP_EQ_OQ); }
 static inline M lt(I a, I b) { return _mm512_cmplt_epi32_mask(i(a), i(b)); }
 static inline M eq(I a, I b) { return _mm512_cmpeq_epi32_mask(i(a), i(b)); }
+static inline M below(I a, int32_t b) { return _mm512_cmplt_epu32_mask(i(a), _mm512_set1_epi32(b)); }  // both as uint32_t
 static inline F select(M m, F a, F b) {
     __m512 out = _mm512_mask_blend_ps(m, f(b), f(a));
     asm("" : "+v"(out));
@@ -33,8 +34,18 @@ static inline M without(M a, M b) { return M(a & ~b); }
 static inline F min(F a, F b) { return (F)_mm512_min_ps(f(b), f(a)); }  // as std::min
 static inline F max(F a, F b) { return (F)_mm512_max_ps(f(b), f(a)); }
 static inline F floor(F a) { return (F)_mm512_roundscale_ps(f(a), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC); }
+static inline I floor_to_int(F a) {
+    return (I)_mm512_cvt_roundps_epi32(f(a), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);
+}
 static inline F sqrt(F a) { return (F)_mm512_sqrt_ps(f(a)); }
-static inline I gather_bytes(const void* base, I index) { return (I)_mm512_i32gather_epi32(i(index), base, 1); }
+template <int kScale = 1>
+static inline I gather_bytes(const void* base, I index) {
+    return (I)_mm512_i32gather_epi32(i(index), base, kScale);
+}
+template <int kScale>
+static inline I gather_bytes(M m, const void* base, I index, I others) {
+    return (I)_mm512_mask_i32gather_epi32(i(others), m, i(index), base, kScale);
+}
 static inline int count(M m) { return __builtin_popcount(m); }
 static inline uint32_t bits(M m) { return m; }
 static inline M mask_of(uint32_t bits) { return M(bits); }

@@ -5,14 +5,25 @@ static inline F min(F a, F b) { return b < a ? b : a; }  // as std::min
 static inline F max(F a, F b) { return a < b ? b : a; }
 static inline F sqrt(F a) { return (F)_mm_sqrt_ps((__m128)a); }
 static inline bool any(M m) { return _mm_movemask_ps((__m128)m) != 0; }
+template <int kScale = 1>
 static inline I gather_bytes(const void* base, I index) {
     I out;
     for (int lane = 0; lane < kLanes; ++lane) {
         int32_t one;
-        std::memcpy(&one, static_cast<const char*>(base) + index[lane], 4);
+        std::memcpy(&one, static_cast<const char*>(base) + ptrdiff_t(index[lane]) * kScale, 4);
         out[lane] = one;
     }
     return out;
+}
+template <int kScale>
+static inline I gather_bytes(M m, const void* base, I index, I others) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+        if (m[lane] == 0) continue;
+        int32_t one;
+        std::memcpy(&one, static_cast<const char*>(base) + ptrdiff_t(index[lane]) * kScale, 4);
+        others[lane] = one;
+    }
+    return others;
 }
 static inline uint32_t bits(M m) { return uint32_t(_mm_movemask_ps((__m128)m)); }
 static inline int count(M m) { return int(0x4332322132212110u >> (4 * bits(m)) & 15); }

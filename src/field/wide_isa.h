@@ -8,6 +8,7 @@
 #include "field/wide.h"
 
 #include <bit>
+#include <cmath>
 #include <cstring>
 
 #define KILN_DECLARE_WIDE(name)                                                                        \

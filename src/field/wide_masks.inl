@@ -8,6 +8,10 @@ static inline M le(F a, F b) { return a <= b; }
 static inline M eq(F a, F b) { return a == b; }
 static inline M lt(I a, I b) { return a < b; }
 static inline M eq(I a, I b) { return a == b; }
+static inline M below(I a, int32_t b) {  // both as uint32_t
+    typedef uint32_t U __attribute__((vector_size(sizeof(I))));
+    return (U)a < uint32_t(b);
+}
 static inline F select(M m, F a, F b) { return m ? a : b; }
 static inline I select(M m, I a, I b) { return m ? a : b; }
 static inline M all() { return I{} == I{}; }

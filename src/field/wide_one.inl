@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Distance at one point: three axes in step instead of many points, and no branch on what is there: which points have a brick is not to be
 // foreseen, and a branch gone wrong would throw away the reads of the points after this one. Included inside a namespace; shares no code
-// with the packets, so that each is the other's check.
+// with the packets (but the table of places), so that each is the other's check.
 
 typedef float F4 __attribute__((vector_size(16)));
 typedef int32_t I4 __attribute__((vector_size(16)));

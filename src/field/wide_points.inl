@@ -34,18 +34,35 @@ static inline Pointers entries_of(const WideView& view, const CellPlace& at, I& 
     return gather_entries(moved(gather_pages(view.pages, at.page), at.word * int32_t(sizeof(WideEntry))), flags);
 }
 
+// A packet of points in voxels: whole numbers (any for points far outside the grid), and the places in the voxels. A place of -0 where a
+// float's floor would leave 0 changes no answer: no texel is -0, so no sum of weighed ones is.
+struct Split {
+    I3 whole;
+    F3 part;
+
+    Split(const WideView& view, F3 p) {
+        const auto axis = [&](F v, I& down, F& rest) {
+            const F q = v * view.inverse_voxel;
+            down = floor_to_int(q);
+            rest = q - to_float(down);
+        };
+        axis(p.x, whole.x, part.x);
+        axis(p.y, whole.y, part.y);
+        axis(p.z, whole.z, part.z);
+    }
+};
+
 // One axis of a point: its cell in the grid and the voxel in the cell (whole numbers), the place in the voxel.
 struct Place {
     F cell, voxel, part;
     M inside;
 };
-static inline Place place_of(F p, F inverse_voxel, float first_texel, float past_texel) {
-    const F q = p * inverse_voxel;
-    const F down = floor(q);
-    const F texel = down - first_texel;
+static inline Place place_of(I at, F part, float first_texel, float past_texel) {
+    const F whole = to_float(at);
+    const F texel = whole - first_texel;
     const F cell = floor((texel + 0.5f) * (1.0f / 7.0f));  // right for grids of fewer than 2^22 texels an axis
-    const M inside = both(le(number(first_texel), down), lt(down, number(past_texel)));
-    return {cell, texel - cell * 7.0f, q - down, inside};
+    const M inside = both(le(number(first_texel), whole), lt(whole, number(past_texel)));
+    return {cell, texel - cell * 7.0f, part, inside};
 }
 
 // A packet of points.
@@ -54,16 +71,14 @@ struct Located {
     M inside;
     CellPlace cell;  // of the grid's first cell for points outside the grid
 
-    Located(const WideView& view, F3 p) {
-        const F inverse = number(view.inverse_voxel);
-        x = place_of(p.x, inverse, view.low[0], view.high[0]);
-        y = place_of(p.y, inverse, view.low[1], view.high[1]);
-        z = place_of(p.z, inverse, view.low[2], view.high[2]);
+    Located(const WideView& view, const Split& p) {
+        x = place_of(p.whole.x, p.part.x, view.low[0], view.high[0]);
+        y = place_of(p.whole.y, p.part.y, view.low[1], view.high[1]);
+        z = place_of(p.whole.z, p.part.z, view.low[2], view.high[2]);
         inside = both(both(x.inside, y.inside), z.inside);
         const auto held = [&](F c) { return select(inside, to_int(c), splat(0)); };  // before they are multiplied
         cell = cell_place(view, {held(x.cell), held(y.cell), held(z.cell)});
     }
-    I row() const { return to_int(y.voxel * 8.0f + x.voxel); }
     I texel() const { return to_int(z.voxel * 64.0f + (y.voxel * 8.0f + x.voxel)); }  // any number beyond the grid
     F3 part() const { return {x.part, y.part, z.part}; }
     // The answer where there is no brick, voxels.
@@ -106,66 +121,118 @@ static inline F answer(const Waiting& at) {
     return select(at.occupied, trilinear(corners_at<Half>(at.brick, at.texel), at.part), at.empty);
 }
 
-#ifdef KILN_WIDE_SLICES
-// Neighbours that lie in one or two cells, as points do that are asked in the order of space: no texel is gathered, each slice of
-// voxels is read once. False where they lie in more.
-template <bool Half>
-static inline bool answer_by_slices(const WideView& view, const Located& p, F& out) {
-    const I index = p.cell.page * int32_t(std::tuple_size_v<WidePage>) + p.cell.word;
-    const M first = eq(index, splat(index[0])), others = without(all(), first);
-    if (any(without(all(), p.inside)) || any(without(others, eq(index, splat(index[kLanes - 1]))))) return false;
-    const I slice = to_int(p.z.voxel);
-    const Words texel = pair_of(p.row());
-    Words v00{}, v10{}, v01{}, v11{};
-    I flags = splat(0);
-    const auto codes_of = [&](int one) {
-        const WideEntry entry = (*view.pages[p.cell.page[one]])[size_t(p.cell.word[one])];
-        flags = select(one == 0 ? all() : others, splat(int32_t(entry >> 32)), flags);
-        return reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-    };
-    constexpr int kSlice = Half ? 128 : 64;  // bytes
-    const auto look = [&](const std::byte* codes, M lanes) {
-        const SliceTable near = slice_table<Half>(codes), far = slice_table<Half>(codes + kSlice);
-        v00 = looked_up(near, texel, 0, lanes, v00);
-        v10 = looked_up(near, texel, 8, lanes, v10);
-        v01 = looked_up(far, texel, 0, lanes, v01);
-        v11 = looked_up(far, texel, 8, lanes, v11);
-    };
-    // Mostly all lie in the slices of the first and the last point, be they one or two: both are read, and no branch is to be foreseen.
-    const int first_z = slice[0], last_z = slice[kLanes - 1];
-    const std::byte* const near_codes = codes_of(0);
-    const std::byte* const far_codes = codes_of(kLanes - 1);
-    const M in_last = both(eq(index, splat(index[kLanes - 1])), eq(slice, splat(last_z)));
-    look(near_codes + first_z * kSlice, all());
-    look(far_codes + last_z * kSlice, in_last);
-    M left = without(without(all(), both(first, eq(slice, splat(first_z)))), in_last);
-    if (any(left)) {
-        int32_t slices[kLanes];
-        std::memcpy(slices, &slice, sizeof slices);
-        do {
-            const int one = __builtin_ctz(bits(left));
-            const M cell = (bits(first) >> one & 1u) != 0 ? first : others;
-            const M here = both(cell, eq(slice, splat(slices[one])));
-            look(((bits(first) >> one & 1u) != 0 ? near_codes : far_codes) + slices[one] * kSlice, here);
-            left = without(left, here);
-        } while (any(left));
+// Of any numbers: what does not fit is cut off.
+typedef uint32_t U __attribute__((vector_size(sizeof(I))));
+static inline I texel_in_space(I3 v) { return (I)(((U)v.z * 8u + (U)v.y) * 8u + (U)v.x); }
+static inline M in_cell(I v, int32_t first) { return below((I)((U)v - uint32_t(first)), 7); }
+
+// The grid's texels by axis.
+struct GridTexels {
+    int32_t first[3];
+    uint32_t count[3];
+
+    explicit GridTexels(const WideView& view) {
+        for (size_t axis = 0; axis < 3; ++axis) {
+            first[axis] = int32_t(view.low[axis]);
+            count[axis] = uint32_t(int32_t(view.high[axis]) - first[axis]);
+        }
     }
-    WideCorners corners;
-    values_of<Half>(v00, corners.v00.a, corners.v00.b);
-    values_of<Half>(v10, corners.v10.a, corners.v10.b);
-    values_of<Half>(v01, corners.v01.a, corners.v01.b);
-    values_of<Half>(v11, corners.v11.a, corners.v11.b);
-    out = trilinear(corners, p.part());
-    const M occupied = is_occupied(flags);
-    if (any(without(all(), occupied))) out = select(occupied, out, p.empty(flags));
-    return true;
+};
+
+// A packet whose neighbours lie in few cells, as points do that are asked in the order of space: a cell is looked up once for all its
+// lanes, and their texels are read from one base.
+template <bool Half>
+struct Neighbours {
+    static constexpr int kBytes = Half ? 2 : 1;
+    struct Cell {
+        M here;                  // lanes in it
+        int32_t flags;           // of its entry
+        const std::byte* first;  // code that the lane asked for reads
+        uintptr_t origin;        // where the code of texel 0 in space would be, were all of space one brick
+    };
+
+    I3 whole;
+    I texel;  // in space, counted as those of a brick
+    int32_t lanes[3][kLanes];
+
+    explicit Neighbours(const I3& at) : whole(at), texel(texel_in_space(at)) {
+        std::memcpy(lanes[0], &at.x, sizeof lanes[0]);
+        std::memcpy(lanes[1], &at.y, sizeof lanes[1]);
+        std::memcpy(lanes[2], &at.z, sizeof lanes[2]);
+    }
+    // The cell of one lane. False outside the grid.
+    bool find(const WideView& view, const GridTexels& grid, int lane, Cell& cell) const {
+        const int32_t at[3] = {lanes[0][lane], lanes[1][lane], lanes[2][lane]};
+        uint64_t place = 0;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const uint32_t from_first = uint32_t(at[axis]) - uint32_t(grid.first[axis]);
+            if (from_first >= grid.count[axis]) return false;
+            place += view.places[axis][from_first];
+        }
+        const int32_t row = int32_t(uint32_t(place));
+        cell.here = both(both(in_cell(whole.x, at[0] - (row & 7)), in_cell(whole.y, at[1] - (row >> 3 & 7))),
+                         in_cell(whole.z, at[2] - (row >> 6)));
+        constexpr size_t kWords = std::tuple_size_v<WidePage>;
+        const size_t index = size_t(place >> 32);
+        const WideEntry entry = (*view.pages[index / kWords])[index % kWords];
+        cell.flags = int32_t(entry >> 32);
+        cell.first = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress)) + row * kBytes;
+        cell.origin = uintptr_t(cell.first) - uintptr_t(int64_t((at[2] * 8 + at[1]) * 8 + at[0]) * kBytes);
+        return true;
+    }
+    // The first codes of a row's pair, of four by y and z. Of bytes, the last pair is the upper two of four that end in the brick.
+    static const void* pairs(uintptr_t origin, int pair) {
+        constexpr int kOffsets[4] = {0, 8 * kBytes, 64 * kBytes, Half ? 72 * kBytes : 70};
+        return reinterpret_cast<const void*>(origin + uintptr_t(kOffsets[pair]));
+    }
+    static F blend(const I (&codes)[4], const F3& part) {
+        return trilinear({values_of<Half>(codes[0]), values_of<Half>(codes[1]), values_of<Half>(codes[2]),
+                          values_of<Half>(Half ? codes[3] : codes[3] >> 16)},
+                         part);
+    }
+    // Of points in more cells than that of the first, `cell`. False where that is a lane a cell, or one is outside the grid.
+    bool answer(const WideView& view, const GridTexels& grid, const Split& p, Cell cell, F& out) const {
+        I codes[4]{}, flags{};
+        M left = all();
+        for (;;) {
+            const M here = both(left, cell.here);
+            left = without(left, here);
+            if ((bits(here) & (bits(here) - 1)) == 0 && any(left)) return false;
+            for (int i = 0; i < 4; ++i) codes[i] = gather_bytes<kBytes>(here, pairs(cell.origin, i), texel, codes[i]);
+            flags = select(here, splat(cell.flags), flags);
+            if (!any(left)) break;
+            if (!find(view, grid, __builtin_ctz(bits(left)), cell)) return false;
+        }
+        out = blend(codes, p.part);
+        const M occupied = is_occupied(flags);
+        if (any(without(all(), occupied))) out = select(occupied, out, Located(view, p).empty(flags));
+        return true;
+    }
+};
+
+// Points in one brick, whose texels are on their way.
+struct Near {
+    I texel;
+    F3 part;
+    uintptr_t origin;
+    int at;  // in the list
+};
+template <bool Half>
+static inline F answer(const Near& p) {
+    using Codes = Neighbours<Half>;
+    I codes[4];
+    for (int i = 0; i < 4; ++i) codes[i] = gather_bytes<Codes::kBytes>(Codes::pairs(p.origin, i), p.texel);
+    return Codes::blend(codes, p.part);
 }
-#endif
 
 template <bool Half>
 static void all_distances(const WideView& view, const sdf::Points& points, float* out) {
-    constexpr int kBlock = 128;  // points whose texels are fetched together
+    constexpr int kBlock = 128;      // points whose texels are fetched together
+    constexpr int kAhead = 2 * kBlock;  // points that are fetched before they are asked for: processors do not look past a page's end
     Waiting waiting[kBlock / kLanes];
+    Near near[kBlock / kLanes];
+    const GridTexels grid(view);
+    const float cell_size = 7 * view.grid.voxel_size;
     for (int at = 0; at < points.count; at += kBlock) {
         const int count = points.count - at < kBlock ? points.count - at : kBlock;
         const float* from[3] = {points.x + at, points.y + at, points.z + at};
@@ -181,18 +248,38 @@ static void all_distances(const WideView& view, const sdf::Points& points, float
             d = d * view.grid.voxel_size;
             std::memcpy(to + i, &d, sizeof d);
         };
-        int n = 0;
+        const auto fetch = [](const float* array, int i) {
+            return reinterpret_cast<const void*>(uintptr_t(array) + size_t(i) * sizeof(float));
+        };
+        // Two points tell whether to look for neighbours: it would be in vain for points of chance.
+        const bool in_order = std::abs(from[0][0] - from[0][1]) < cell_size;
+        int n = 0, m = 0;
         for (int i = 0; i < kBlock; i += kLanes) {
-            const Located p(view, {load(from[0] + i), load(from[1] + i), load(from[2] + i)});
-#ifdef KILN_WIDE_SLICES
-            if (F d; answer_by_slices<Half>(view, p, d)) {
-                store(i, d);
-                continue;
+            for (const float* const array : {from[0], from[1], from[2]}) __builtin_prefetch(fetch(array, i + kAhead));
+            __builtin_prefetch(fetch(to, i + kAhead), 1);
+            const Split p(view, {load(from[0] + i), load(from[1] + i), load(from[2] + i)});
+            if (in_order) {
+                const Neighbours<Half> all_here(p.whole);
+                typename Neighbours<Half>::Cell cell;
+                const bool found = all_here.find(view, grid, 0, cell);
+                if (found && !any(without(all(), cell.here))) {
+                    if (cell.flags < 0) {
+                        near[m++] = {all_here.texel, p.part, cell.origin, i};
+                        __builtin_prefetch(cell.first);
+                        __builtin_prefetch(cell.first + 72 * (Half ? 2 : 1));
+                    } else {
+                        store(i, Located(view, p).empty(splat(cell.flags)));
+                    }
+                    continue;
+                }
+                if (F d; found && all_here.answer(view, grid, p, cell, d)) {
+                    store(i, d);
+                    continue;
+                }
             }
-#endif
             Waiting& w = waiting[n++];
             w.at = i;
-            wait_for(view, p, w);
+            wait_for(view, Located(view, p), w);
             const Pointers texels = moved(w.brick, w.texel * (Half ? 2 : 1));
             const std::byte* rows[kLanes];
             std::memcpy(rows, &texels, sizeof rows);
@@ -201,6 +288,7 @@ static void all_distances(const WideView& view, const sdf::Points& points, float
                 __builtin_prefetch(row + 72 * (Half ? 2 : 1));
             }
         }
+        for (int i = 0; i < m; ++i) store(near[i].at, answer<Half>(near[i]));
         for (int i = 0; i < n; ++i) store(waiting[i].at, answer<Half>(waiting[i]));
         if (count < kBlock) std::memcpy(out + at, answers, sizeof(float) * size_t(count));
     }

@@ -23,6 +23,8 @@ static inline F floor(F a) {
     return down > a ? down - 1.0f : down;
 }
 
+static inline I floor_to_int(F a) { return to_int(floor(a)); }
+
 #include "field/wide_math.inl"
 
 #include "field/wide_points.inl"

@@ -19,6 +19,8 @@ typedef int32_t I __attribute__((vector_size(16)));
 
 static inline F floor(F a) { return (F)_mm_floor_ps((__m128)a); }
 
+static inline I floor_to_int(F a) { return to_int(floor(a)); }
+
 #include "field/wide_math.inl"
 
 #include "field/wide_points.inl"

@@ -92,6 +92,60 @@ TEST_P(WideInEachFormat, DistancesAreThoseOfOnePointAtATimeOnEveryInstructionSet
     }
 }
 
+// Blocks of neighbours whose packets (16, 8 or 4 of them) go from cell to cell at any lane, into empty cells and out of the grid.
+Cloud packets_across_cells() {
+    constexpr float h = 0.03f, cell = 7 * h;
+    std::mt19937 random(5);
+    std::uniform_real_distribution<float> inside(0.01f, 0.99f);
+    Cloud out;
+    const auto point_in = [&](int x, int y, int z) {
+        out.add((float(x) + inside(random)) * cell, (float(y) + inside(random)) * cell,
+                (float(z) + inside(random)) * cell);
+    };
+    for (int i = 0; i < 12000; ++i) {
+        const int cells = 1 + i % 5, base[3] = {int(random() % 12) - 6, int(random() % 12) - 6, int(random() % 12) - 6};
+        int at[5][3];
+        for (auto& one : at) {
+            for (int axis = 0; axis < 3; ++axis) one[axis] = base[axis] + int(random() % 2);
+        }
+        int ends[5];
+        for (int& end : ends) end = int(random() % 17);
+        const bool mixed = i % 7 == 0;
+        for (int lane = 0; lane < 16; ++lane) {
+            int one = 0;
+            while (one < cells - 1 && (mixed ? random() % 2 == 0 : lane >= ends[one])) ++one;
+            point_in(at[one][0], at[one][1], at[one][2]);
+        }
+    }
+    for (int i = 0; i < 4000; ++i) {  // on texels, also on those of faces, and on either zero
+        const int x = i % 20 - 10, y = i / 20 % 20 - 10, z = i / 400 - 5;
+        out.add(x == 0 ? -0.0f : float(x) * h, y == 0 ? -0.0f : float(y) * h, z == 0 ? -0.0f : float(z) * h);
+    }
+    return out;
+}
+
+TEST_P(WideInEachFormat, PacketsThatCrossCellsAtAnyLaneAnswerAsOnePointAtATime) {
+    const HostBricks bricks = bricks_of(GetParam(), mixed());
+    const Cloud c = packets_across_cells();
+    std::vector<float> one(c.x.size());
+    int negative = 0, unknown = 0;
+    for (size_t i = 0; i < one.size(); ++i) {
+        one[i] = bricks.distance({c.x[i], c.y[i], c.z[i]}, sdf::Isa::Scalar);
+        negative += one[i] < 0;
+        unknown += one[i] == 0;
+    }
+    EXPECT_GT(negative, 10000);
+    EXPECT_GT(unknown, 1000);
+    for (const sdf::Isa isa : isas()) {
+        std::vector<float> out(c.x.size(), -77);
+        bricks.distances(c.points(), out.data(), isa);
+        for (size_t i = 0; i < out.size(); ++i)
+            ASSERT_EQ(std::bit_cast<uint32_t>(out[i]), std::bit_cast<uint32_t>(one[i]))
+                << "isa " << int(isa) << " point " << i << ", lane " << i % 16 << ": " << c.x[i] << " " << c.y[i] << " "
+                << c.z[i];
+    }
+}
+
 TEST_P(WideInEachFormat, DistancesAreTheBricksWhereOneIsAndABoundElsewhere) {
     const HostBricks bricks = bricks_of(GetParam(), mixed());
     const Cloud c = cloud();
