@@ -28,4 +28,11 @@ std::string format_args(std::string_view pattern, std::initializer_list<FormatAr
     }
 }
 
+std::string one_line(std::string_view text) {
+    std::string out(text);
+    for (char& c : out) c = uint8_t(c) < 0x20 || c == 0x7f ? ' ' : c;
+    while (out.ends_with(' ')) out.pop_back();
+    return out;
+}
+
 }  // namespace kiln

@@ -48,4 +48,7 @@ std::string formatted(std::string_view pattern, const Args&... args) {
     return format_args(pattern, {FormatArg(args)...});
 }
 
+/// What a library says, as part of a message of ours: control characters become spaces, and none are left at the end.
+std::string one_line(std::string_view text);
+
 }  // namespace kiln

@@ -130,7 +130,7 @@ Result<FloatPixels> decode_exr(std::span<const std::byte> bytes, const std::stri
         return decode(bytes, name, most_pixels);
     } catch (const std::exception& e) {
         // The library begins its messages with its own words for the file.
-        return Error{formatted("{}: broken OpenEXR: {}", name, e.what()), ErrorKind::Input};
+        return Error{formatted("{}: broken OpenEXR: {}", name, one_line(e.what())), ErrorKind::Input};
     }
 }
 

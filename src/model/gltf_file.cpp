@@ -11,9 +11,19 @@
 namespace kiln::model {
 namespace {
 
-// Keeps an image as the file has it: `image.image` holds the PNG's or JPEG's bytes.
-bool keep_bytes(tinygltf::Image* image, const int, std::string*, std::string*, int, int, const unsigned char* bytes,
-                int size, void*) {
+// Keeps an image as the file has it: `image.image` holds the PNG's or JPEG's bytes. `model` is what has been read so far; that a view of
+// its buffers lies inside of them has not been looked at.
+bool keep_bytes(tinygltf::Image* image, const int number, std::string* error, std::string*, int, int,
+                const unsigned char* bytes, int size, void* model) {
+    if (image->bufferView >= 0) {
+        const auto& read = *static_cast<const tinygltf::Model*>(model);
+        const tinygltf::BufferView& view = read.bufferViews[size_t(image->bufferView)];
+        const size_t limit = read.buffers[size_t(view.buffer)].data.size();
+        if (view.byteOffset > limit || view.byteLength > limit - view.byteOffset) {
+            *error += formatted("images[{}] reaches beyond its buffer", number);
+            return false;
+        }
+    }
     image->image.assign(bytes, bytes + std::max(size, 0));
     return true;
 }
@@ -32,7 +42,7 @@ Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& nam
     try {
         tinygltf::Model model;
         tinygltf::TinyGLTF loader;
-        loader.SetImageLoader(keep_bytes, nullptr);
+        loader.SetImageLoader(keep_bytes, &model);
         std::string why, warning;
         if (bytes.size() > (size_t(1) << 31))
             return Error{name + ": larger than 2 GiB; split the model", ErrorKind::Input};
@@ -42,16 +52,12 @@ Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& nam
                 ? loader.LoadBinaryFromMemory(&model, &why, &warning,
                                               reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
                 : loader.LoadASCIIFromString(&model, &why, &warning, bytes.data(), size, folder);
-        if (!read) {
-            for (char& c : why) c = c == '\n' ? ' ' : c;
-            while (why.ends_with(' ')) why.pop_back();
-            return unreadable(why);
-        }
+        if (!read) return unreadable(one_line(why));
         return model;
     } catch (const std::bad_alloc&) {
         return Error{name + ": not enough memory for it; simplify the model", ErrorKind::OutOfMemory};
     } catch (const std::exception& e) {
-        return unreadable(e.what());
+        return unreadable(one_line(e.what()));
     }
 }
 

@@ -24,6 +24,8 @@ TEST(Format, TakesEveryKindOfValue) {
     EXPECT_EQ(formatted("{}{}{} {}", word, "c", 'x', Colour::Green), "wordcx 1");
     EXPECT_EQ(formatted("{}", std::numeric_limits<uint64_t>::max()), "18446744073709551615");
     EXPECT_EQ(formatted("{}", static_cast<const char*>(nullptr)), "(null)");
+    EXPECT_EQ(one_line("two\nlines\tand\x7f\x1b ends\r\n"), "two lines and   ends");
+    EXPECT_EQ(one_line(" \n"), "");
     EXPECT_EQ(formatted("{{}} {1} {0}", 1, 2), "{} 2 1");
 }
 

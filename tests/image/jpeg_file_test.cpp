@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 
+#include "feed.h"
 #include "image/jpeg_bytes.h"
 #include "image/jpeg_file.h"
 
@@ -66,12 +67,8 @@ TEST(JpegFile, AnyBytesAreAPictureOrAnError) {
             bytes[3 + random() % (bytes.size() - 3)] = std::byte(random() & 255);
         if (random() % 8 == 0) bytes.resize(3 + random() % (bytes.size() - 3));
         const auto picture = decode_jpeg(bytes, "a.jpg");
-        if (!picture) {
-            ASSERT_EQ(picture.error().kind, ErrorKind::Input);
-            continue;
-        }
-        ++read;
-        ASSERT_EQ(picture->values.size(), size_t(picture->width) * size_t(picture->height) * size_t(picture->channels));
+        read += picture ? 1 : 0;
+        ASSERT_EQ(pixels_complaint(picture, "a.jpg"), "");
     }
     EXPECT_GT(read, 50);
 }
