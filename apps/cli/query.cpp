@@ -183,14 +183,14 @@ void answer_nearest(const World& world, const WorldView& view, const std::vector
     }
 }
 
-void answer_rays(const World& world, const WorldView& view, const std::vector<Row>& rows, std::string& out) {
+void answer_rays(const World& world, const std::vector<Row>& rows, FieldSource source, std::string& out) {
     std::vector<Ray> rays;
     rays.reserve(rows.size());
     for (const Row& r : rows) {
         const auto& n = r.numbers;
         rays.push_back({.origin = {n[0], n[1], n[2]}, .direction = {n[3], n[4], n[5]}});
     }
-    for (const RayHit& hit : view.cast(rays)) {
+    for (const RayHit& hit : world.cast(rays, source)) {
         if (!hit.hit) {
             out += "0,,,,,,,,\n";
             continue;
@@ -205,8 +205,8 @@ void answer_rays(const World& world, const WorldView& view, const std::vector<Ro
 }
 
 int query(const Options& o) {
-    if (int(o.bricks) + int(o.rays) + int(o.nearest) > 1) {
-        say("kiln query: --field, --rays and --nearest do not go together; leave one out");
+    if (o.nearest && (o.bricks || o.rays)) {
+        say("kiln query: --nearest does not go together with --field or --rays; leave it out");
         return kUsage;
     }
     auto input = Input::open(o.points);
@@ -215,6 +215,7 @@ int query(const Options& o) {
     if (!world) return fail(world.error());
     std::string out = o.rays ? "hit,t,x,y,z,nx,ny,nz,edit\n" : "x,y,z,distance,nx,ny,nz,material\n";
     const WorldView view = world->view();
+    const FieldSource source = o.bricks ? FieldSource::Bricks : FieldSource::Exact;
     std::vector<Row> rows;
     bool more = true;
     while (more) {
@@ -229,11 +230,11 @@ int query(const Options& o) {
             rows.push_back(row);
         }
         if (o.rays) {
-            answer_rays(*world, view, rows, out);
+            answer_rays(*world, rows, source, out);
         } else if (o.nearest) {
             answer_nearest(*world, view, rows, out);
         } else {
-            answer_points(*world, rows, o.bricks ? FieldSource::Bricks : FieldSource::Exact, out);
+            answer_points(*world, rows, source, out);
         }
         if (!put(out)) break;
         out.clear();
@@ -256,7 +257,8 @@ void add_query(CLI::App& app, Run& run) {
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("--points", o->points, "CSV of x,y,z (rays: ox,oy,oz,dx,dy,dz), a header is optional; - for stdin")
         ->required();
-    verb->add_flag("--field", o->bricks, "from the bricks instead of the exact edits");
+    verb->add_flag("--field", o->bricks,
+                   "from the baked bricks instead of the exact edits; rays too, which is faster for many");
     verb->add_flag("--rays", o->rays, "rows are rays; answers hit,t,x,y,z,nx,ny,nz,edit");
     verb->add_flag("--nearest", o->nearest, "true nearest-surface distance, also where the edits' own value is less");
     verb->callback([o, &run] { run = [o] { return query(*o); }; });

@@ -51,7 +51,7 @@ struct NearestPoint {
 /// Where a question is answered from.
 enum class FieldSource : uint8_t {
     Exact,   ///< the full ordered list of edits
-    Bricks,  ///< the baked bricks (trilinear), exact edits where no brick is
+    Bricks,  ///< the baked bricks (points: trilinear), exact edits where no brick is
 };
 
 /// A world's field as it was when the view was taken: changes to the world do not reach it. Cheap to copy; every function may be

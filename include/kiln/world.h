@@ -192,6 +192,9 @@ public:
     FieldSample sample(vec3 p_world, FieldSource source = FieldSource::Exact) const;
     std::vector<FieldSample> sample(std::span<const vec3> p_world, FieldSource source = FieldSource::Exact) const;
     RayHit cast(const Ray& ray) const;
+    /// Bricks: rays march through the baked bricks, sixteen neighbours of the list in step, and are then moved to the edits' own surface; what
+    /// only grazes it may be missed. Much faster where there are many rays: give them in an order in which neighbours see the same.
+    std::vector<RayHit> cast(std::span<const Ray> rays, FieldSource source = FieldSource::Exact) const;
     /// What can be asked of the field as it is now, also from other threads while this world changes. Cheap: it holds the compiled
     /// edits, which are compiled when they are first needed. A world that cannot be compiled is seen as empty.
     WorldView view() const;

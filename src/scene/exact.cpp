@@ -229,9 +229,19 @@ RayHit ExactField::cast(const Ray& ray, sdf::Regions::Cursor& cursor) const {
     out.hit = true;
     out.t = float(t);
     out.position = to_float(p);
-    out.normal = gradient(regions_, p, cursor);
-    out.edit = {edit_near(p, cursor), 0};
+    describe(p, out, cursor);
     return out;
+}
+
+void ExactField::describe(dvec3 p, RayHit& hit, sdf::Regions::Cursor& cursor) const {
+    hit.normal = gradient(regions_, p, cursor);
+    hit.edit = {edit_near(p, cursor), 0};
+}
+
+void ExactField::describe(std::span<RayHit* const> hits) const {
+    for_each_question(hits.size(), [&](size_t i, sdf::Regions::Cursor& cursor) {
+        describe(to_double(hits[i]->position), *hits[i], cursor);
+    });
 }
 
 // Conservative advancement (Mirtich, "Timewarp Rigid Body Simulation", 2000): by the program's value while that is far from the

@@ -26,6 +26,8 @@ public:
     /// RayHit::edit.index is the edit's row in the program; its generation is 0.
     RayHit cast(const Ray& ray) const;
     void cast(std::span<const Ray> rays, RayHit* out) const;
+    /// Normals and edits of hits whose positions are given.
+    void describe(std::span<RayHit* const> hits) const;
     /// The centre of a ball of `radius` that moves along the ray until it touches solid.
     RayHit cast_sphere(const Ray& ray, float radius) const;
     NearestPoint nearest(vec3 p, float within) const;
@@ -36,6 +38,7 @@ public:
 private:
     double distance(dvec3 p, sdf::Regions::Cursor& cursor) const;
     RayHit cast(const Ray& ray, sdf::Regions::Cursor& cursor) const;
+    void describe(dvec3 p, RayHit& hit, sdf::Regions::Cursor& cursor) const;
     NearestPoint nearest(vec3 p, float within, sdf::Regions::Cursor& cursor) const;
     uint32_t edit_near(dvec3 p, sdf::Regions::Cursor& cursor) const;
 

@@ -217,6 +217,14 @@ struct World::Impl {
                                                                 const FrameBudget& budget);
     /// Trilinear in bricks, exact elsewhere; false when there is no field.
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);
+    /// First solid points along rays by the bricks' march, on the edits' surface; false when there is no field.
+    bool cast_bricks(std::span<const Ray> rays, const FieldSettings& settings, RayHit* hits);
+    /// The bricks of the field as it is now, and what stands apart from it.
+    struct Baked {
+        std::shared_ptr<const field::HostBricks> bricks;
+        std::vector<Instance> apart;
+    };
+    std::optional<Baked> baked(const FieldSettings& settings);
 };
 
 }  // namespace kiln

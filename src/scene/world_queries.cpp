@@ -23,6 +23,14 @@ std::vector<FieldSample> World::sample(std::span<const vec3> points, FieldSource
 
 RayHit World::cast(const Ray& ray) const { return view().cast(ray); }
 
+std::vector<RayHit> World::cast(std::span<const Ray> rays, FieldSource source) const {
+    if (source == FieldSource::Bricks) {
+        std::vector<RayHit> out(rays.size());
+        if (impl_->cast_bricks(rays, field_settings, out.data())) return out;
+    }
+    return view().cast(rays);
+}
+
 float WorldView::distance(vec3 p) const {
     float out;
     distance(std::span(&p, 1), std::span(&out, 1));

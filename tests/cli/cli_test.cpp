@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -255,6 +256,13 @@ TEST_F(Cli, QueryAnswersInOrder) {
     write("r.csv", "0,5,0,0,-2,0\n5,0,0,0,1,0\n");
     const Outcome rays = run("query two.kiln.json --rays --points r.csv");
     EXPECT_THAT(rays.out, StartsWith("hit,t,x,y,z,nx,ny,nz,edit\n1,4,0,1,0,0,1,0,ball\n0,,,,,,,,\n")) << rays.err;
+    const Outcome bricks = run("query two.kiln.json --rays --field --points r.csv");
+    float t = 0;
+    char rest[64]{};
+    ASSERT_EQ(std::sscanf(bricks.out.c_str(), "hit,t,x,y,z,nx,ny,nz,edit\n1,%f,%63s", &t, rest), 2) << bricks.out;
+    EXPECT_NEAR(t, 4, 1e-4f);
+    EXPECT_THAT(bricks.out, testing::EndsWith(",ball\n0,,,,,,,,\n"));
+    EXPECT_EQ(run("query two.kiln.json --rays --nearest --points r.csv").code, 2);
 
     const std::pair<const char*, const char*> bad[] = {
         {"1,2\n", "bad.csv:1: "},        {"x,y,z\n1,2,3\n1,2,q\n", "bad.csv:3: "},

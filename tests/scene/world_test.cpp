@@ -14,6 +14,8 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <map>
+#include <random>
 #include <thread>
 
 namespace kiln {
@@ -31,7 +33,7 @@ Edit ball(float radius, vec3 at = {}) {
 TEST(World, EmptyWorldAnswers) {
     const World world;
     EXPECT_TRUE(std::isinf(world.distance({0, 0, 0})));
-    EXPECT_FALSE(world.cast({}).hit);
+    EXPECT_FALSE(world.cast(Ray{}).hit);
     EXPECT_TRUE(world.bounds().empty());
     const auto frame = world.frame();
     ASSERT_TRUE(frame) << frame.error().message;
@@ -147,6 +149,53 @@ TEST(World, FrameOfAChangedWorldIsTheFrameOfANewOne) {
     }
     EXPECT_EQ(first->field->stats().bricks, world.frame()->field == first->field ? 0u : first->field->stats().bricks)
         << "old snapshots stay";
+}
+
+TEST(World, RaysThroughBricksMeetWhatTheEditsShowAlsoOutsideTheGrid) {
+    // A ground and a ball outside the grid, blended things and a cut within it, and one that stands apart.
+    auto world = World::parse(
+        R"({"format": 1, "field": {"voxel_size": 0.05, "bounds": {"min": [-2, -1.5, -2], "max": [2, 2, 2]}}, "edits": [
+        {"id": "ground", "shape": "plane", "position": [0, -1, 0]},
+        {"id": "far", "shape": "sphere", "radius": 0.7, "position": [4, 0, 0]},
+        {"id": "a", "shape": "sphere", "radius": 0.8},
+        {"id": "b", "shape": "box", "half_extents": [0.3, 0.9, 0.3], "position": [0.7, 0, 0], "blend_radius": 0.2},
+        {"id": "cut", "shape": "sphere", "radius": 0.4, "position": [-0.5, 0.4, 0.3], "op": "subtract"},
+        {"id": "rock", "shape": "box", "half_extents": [0.3, 0.2, 0.25], "position": [-1.2, 0.6, 0.8], "rotation": [0.6, 0, 0, 0.8], "dynamic": true}]})",
+        "rays");
+    ASSERT_TRUE(world) << world.error().message;
+    std::mt19937 random(7);
+    std::uniform_real_distribution<float> in(-1, 1);
+    std::vector<Ray> rays;
+    for (int i = 0; i < 6000; ++i) {
+        const vec3 from = vec3{in(random), in(random)*0.5f + 0.45f, in(random)} * 6.0f;
+        const vec3 to{5 * in(random), in(random), 1.5f * in(random)};
+        rays.push_back({from, (to - from) * (i % 3 == 0 ? 2.0f : 1 / length(to - from)), i % 5 == 0 ? 4.0f : 1e30f});
+    }
+    rays.push_back({{0, 0, 0}, {0, 1, 0}});       // begins in solid
+    rays.push_back({{0, -1.2f, 5}, {0, 1, 0}});   // outside the grid too
+    rays.push_back({{0, 3, 0}, {0, 0, 0}});       // no direction
+    rays.push_back({{0, 3, 0}, {0, -1, 0}, -1});  // no way to go
+    rays.push_back({{std::nanf(""), 3, 0}, {0, -1, 0}});
+    const std::vector<RayHit> exact = world->cast(rays), bricks = world->cast(rays, FieldSource::Bricks);
+    std::map<std::string, int> met;
+    int differ = 0;
+    for (size_t i = 0; i < rays.size(); ++i) {
+        if (exact[i].hit != bricks[i].hit || std::fabs(exact[i].t - bricks[i].t) > 1e-4f * (1 + exact[i].t)) {
+            EXPECT_LT(i, 6000u) << "one of those that are told apart by hand";
+            ++differ;
+            continue;
+        }
+        if (!exact[i].hit) continue;
+        EXPECT_GT(dot(exact[i].normal, bricks[i].normal), 0.99f) << i;
+        const Edit* edit = world->find(bricks[i].edit);
+        ASSERT_NE(edit, nullptr) << i;
+        ++met[edit->name];
+    }
+    EXPECT_LE(differ, 12) << "of 6000: only rays that graze";
+    for (const char* name : {"ground", "far", "a", "b", "cut", "rock"}) EXPECT_GT(met[name], 20) << name;
+    // A change is seen by the next question.
+    ASSERT_TRUE(world->remove(*world->find_edit("a")));
+    EXPECT_FALSE(world->cast(std::vector<Ray>{{{-0.3f, 0, 3}, {0, 0, -1}, 2.9f}}, FieldSource::Bricks)[0].hit);
 }
 
 TEST(World, ReorderMovesAnEditAndTheFieldFollows) {

@@ -249,8 +249,10 @@ TEST(Rate, HoldsOverRandomTrees) {
 }
 
 TEST(Trees, AreOneLipschitzAndTheJudgesValue) {
+    // About one tree in three is one that can be. How many of a seed are varies (once 90 of 500), so there are more until there are enough.
+    constexpr int kEnough = 100;
     int judged = 0;
-    for (int round = 0; round < 5; ++round) {
+    for (int round = 0; round < 5 || (judged < kEnough && round < 50); ++round) {
         for_all("trees", [&](RandomValues& random) {
             Scene scene;
             for (int o = 0; o < 2; ++o) scene.objects.push_back(random_tree(random, 8, o));
@@ -274,7 +276,7 @@ TEST(Trees, AreOneLipschitzAndTheJudgesValue) {
             }
         });
     }
-    EXPECT_GT(judged, 100);
+    EXPECT_GE(judged, kEnough);
 }
 
 // ---- Each part of the proof with the scene that needs it.
