@@ -60,8 +60,9 @@ constexpr KeyRow kFieldRows[] = {
            "finest voxel; left out: the longest finite side / 256"),
     number("levels", kKept, 1, "1", "integer [1, 16]", "levels of detail, each with voxels twice as large"),
     number("cells", kKept, 64, "1", "integer [8, 512]", "bricks a side per level, a power of two"),
-    inside("bounds", KeyType::Object, kBoundsTable,
-           "what the field covers; left out: the finite edits, inflated by 10 %"),
+    inside(
+        "bounds", KeyType::Object, kBoundsTable,
+        "what the field covers; left out: the finite edits, inflated by 10 %, and as far as they blend with a ground"),
     plain("distance_8bit", KeyType::Bool, "bricks store distance in 8 bits instead of 16"),
 };
 constexpr KeyRow kMaterialRows[] = {

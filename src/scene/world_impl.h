@@ -219,4 +219,9 @@ struct World::Impl {
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);
 };
 
+inline float longest_side(const Box3& box) {
+    const vec3 size = box.max - box.min;
+    return std::max({size.x, size.y, size.z});
+}
+
 }  // namespace kiln
