@@ -9,6 +9,7 @@
 
 #include <kiln/world.h>
 
+#include <algorithm>
 #include <memory>
 
 namespace kiln::cli {
@@ -23,8 +24,10 @@ struct Options {
 int demo(Options o) {
     const auto scenes = bundled_scenes();
     if (o.list) {
+        size_t widest = 0;
+        for (const auto& scene : scenes) widest = std::max(widest, scene.first.size());
         for (const auto& [name, description] : scenes)
-            (void)put(name + std::string(name.size() < 9 ? 9 - name.size() : 1, ' ') + description + "\n");
+            (void)put(name + std::string(widest + 2 - name.size(), ' ') + description + "\n");
         return finish_data();
     }
     std::vector<std::string_view> names;

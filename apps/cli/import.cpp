@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // kiln import MODEL -o SCENE: a scene with the model as a mesh shape. Says on stderr what was found in the model.
 
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -37,14 +38,13 @@ int run_import(const Options& o) {
     if (o.up != "y" && o.up != "z") return usage("--up " + o.up + ": not an axis; write y or z");
     if (o.resolution < 8 || o.resolution > 512)
         return usage("--resolution " + std::to_string(o.resolution) + ": must be between 8 and 512");
-    if (!o.output.ends_with(".json")) return usage(o.output + ": a scene's name ends in .kiln.json");
+    if (auto ok = writable_scene(o.output); !ok) return fail(ok.error());
     settings.z_up = o.up == "z";
     settings.resolution = o.resolution;
     struct stat info {};
     if (!o.force && ::stat(o.output.c_str(), &info) == 0)
         return fail(Error{o.output + ": is there already; choose another name, or add --force to write over it",
                           ErrorKind::Failed});
-    if (auto ok = writable(o.output); !ok) return fail(ok.error());
     Progress progress;
     progress.stage("reading " + o.model);
     const auto world = World::import(o.model, o.output, settings);

@@ -34,12 +34,10 @@ constexpr std::string_view kFirst = R"({
 )";
 
 int make(const Options& o) {
-    if (!o.scene.ends_with(".kiln.json"))
-        return fail({o.scene + ": a scene's name ends in .kiln.json", ErrorKind::Usage});
+    if (auto ok = writable_scene(o.scene); !ok) return fail(ok.error());
     for (const std::string& file : {o.scene, o.scene + ".journal"})
         if (!o.force && ::access(file.c_str(), F_OK) == 0)
             return fail({file + ": is there already; --force writes over it", ErrorKind::Failed});
-    if (auto ok = writable(o.scene); !ok) return fail(ok.error());
     auto world = o.from.empty() ? World::parse(kFirst, o.scene) : load_scene(o.from);
     if (!world) return fail(world.error());
     if (auto saved = world->save(o.scene); !saved) return fail(saved.error());

@@ -95,17 +95,17 @@ Result<RenderSettings> picture_settings(const PictureOptions& o) {
         if (!quality) return quality.error();
         if (o.no_refine || o.taa)
             return usage("--quality decides what --no-refine and --taa do; leave one of them out");
-        if (o.reference > 0) return usage("--quality is for the renderer, not for --reference; leave one of them out");
+        if (o.reference) return usage("--quality is for the renderer, not for --reference; leave one of them out");
     }
     if (o.unpruned && !o.analytic) return usage("--unpruned works with --analytic; add it");
-    if (o.reference < 0) return usage("--reference takes a number of samples above 0");
+    if (o.reference && *o.reference < 1) return usage("--reference takes a number of samples above 0");
     if (!(o.time >= 0 && o.time <= 1e9)) return usage("--time wants seconds, 0 or more");
     if (!o.path.empty() && o.frames < 2) return usage("--path wants --frames, 2 or more");
     if (o.path.empty() && (o.frames != 0 || o.budget != 0))
         return usage("--frames and --budget work with --path; add it");
-    if (!o.path.empty() && (!o.camera.empty() || o.reference > 0))
+    if (!o.path.empty() && (!o.camera.empty() || o.reference))
         return usage("--path has its own cameras and no --reference; leave --camera and --reference out");
-    if (o.taa && (o.reference > 0 || s.view != View::Shaded))
+    if (o.taa && (o.reference || s.view != View::Shaded))
         return usage("--taa works on shaded pictures, without --reference; leave it out");
     if (o.transparent_layers && (*o.transparent_layers < 0 || *o.transparent_layers > 16))
         return usage("--transparent-layers " + std::to_string(*o.transparent_layers) + ": it is 0 to 16");
@@ -150,12 +150,6 @@ std::string with_commas(uint64_t n) {
     std::string s = std::to_string(n);
     for (int at = int(s.size()) - 3; at > 0; at -= 3) s.insert(size_t(at), ",");
     return s;
-}
-
-std::string brief(double value, const char* unit) {
-    char buffer[64];
-    std::snprintf(buffer, sizeof buffer, value < 10 ? "%.2f %s" : "%.0f %s", value, unit);
-    return buffer;
 }
 
 void introduce(const RenderStats& stats) {
@@ -372,9 +366,9 @@ int render_picture(const PictureOptions& o) {
     Result<Picture> picture = Error{};
     RenderStats stats;
     std::string_view quality = "reference";
-    if (o.reference > 0) {
+    if (o.reference) {
         progress.stage("tracing paths");
-        picture = render_reference(*frame, *settings, o.reference, &stats);
+        picture = render_reference(*frame, *settings, *o.reference, &stats);
     } else {
         progress.stage("starting the device");
         auto renderer = Renderer::create({.device = o.device});

@@ -15,9 +15,9 @@ struct PictureOptions {
     std::string scene, output, camera, size = "1280x720", view = "shaded", device = "auto", tier = "auto";
     std::string path;  ///< names of cameras, by commas: a sequence of `frames` pictures along them
     int frames = 0;
-    double time = 0;      ///< seconds, of the meshes' animations
-    uint32_t budget = 0;  ///< bricks a frame of a sequence, 0: no limit
-    int reference = 0;
+    double time = 0;               ///< seconds, of the meshes' animations
+    uint32_t budget = 0;           ///< bricks a frame of a sequence, 0: no limit
+    std::optional<int> reference;  ///< samples a pixel; left out: no path tracing
     bool analytic = false, unpruned = false, no_accelerate = false, no_refine = false, all_lights = false,
          atlas_by_copy = false, no_cull = false;
     std::optional<int> transparent_layers;  ///< left out: as the quality says

@@ -25,4 +25,9 @@ void add_journal(Json& json, const World& world) {
     json.raw("journal", one.object());
 }
 
+Result<void> writable_scene(const std::string& path) {
+    if (!path.ends_with(".kiln.json")) return Error{path + ": a scene's name ends in .kiln.json", ErrorKind::Usage};
+    return writable(path);
+}
+
 }  // namespace kiln::cli

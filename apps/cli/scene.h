@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Loading a scene for a verb: with its journal, which is told on stderr and in reports.
+// Loading a scene for a verb, with its journal, which is told on stderr and in reports; and where one may be written.
 #pragma once
 
 #include "cli/json.h"
@@ -14,6 +14,8 @@ namespace kiln::cli {
 void tell_journal(const World& world);
 /// World::load(), told.
 Result<World> load_scene(const std::string& path_or_name);
+/// Why no scene can be written there: its name does not end in .kiln.json, or the file cannot be made. Known before any work is done.
+Result<void> writable_scene(const std::string& path);
 /// "journal": {…} where there is one to tell of.
 void add_journal(Json& json, const World& world);
 

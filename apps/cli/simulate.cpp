@@ -3,6 +3,7 @@
 
 #include "cli/film.h"
 #include "cli/json.h"
+#include "cli/scene.h"
 #include "cli/talk.h"
 #include "cli/verbs.h"
 
@@ -32,6 +33,9 @@ int simulate(const Options& o) {
     for (const std::string& section : world->not_drawn_yet())
         if (section != "meshes" && section != "triggers" && section != "characters")
             say("kiln simulate: " + o.scene + ": this version does not simulate \"" + section + "\"");
+    if (!o.keep.empty()) {
+        if (auto ok = writable_scene(o.keep); !ok) return fail(ok.error());
+    }
     SimulateSettings settings = o.settings;
     if (!o.edits.empty()) {
         auto commands = read_timed_commands(o.edits);
@@ -79,7 +83,7 @@ int simulate(const Options& o) {
         (void)put(*ways);
     } else {
         (void)put("simulated " + Json::digits(o.settings.seconds) + " s of " + o.scene + " in " +
-                  Json::digits(watch.seconds()) + " s; --json tells where the bodies went\n");
+                  brief(watch.seconds(), "s") + "; --json tells where the bodies went\n");
     }
     return finish_data();
 }
@@ -97,7 +101,7 @@ void add_simulate(CLI::App& app, Run& run) {
         "  kiln simulate scene.kiln.json --seconds 10 --backend bullet --field-bodies --json\n"
         "  kiln simulate quarry --seconds 10 --edits digs.jsonl --keep dug.kiln.json\n"
         "  kiln simulate tumble --seconds 4 --every 0.1 --out pictures --png --size 640x360 --view contacts");
-    verb->add_option("scene", o->scene, "scene file, or the name of a bundled scene")->required();
+    verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
     verb->add_option("--seconds", o->settings.seconds, "how long")->required();
     verb->add_option("--every", o->settings.every, "seconds between frames; left out: each step");
     verb->add_option("--backend", o->settings.backend, "physics engine, see `kiln doctor`; left out: the default");
@@ -110,19 +114,24 @@ void add_simulate(CLI::App& app, Run& run) {
         "--edits", o->edits,
         "changes on the way: JSON lines {\"time\": seconds, \"command\": {\"add\": EDIT}} and the like; with "
         "\"target\" they act on bodies too");
-    verb->add_option("--keep", o->keep,
-                     "scene file to write: what the scene is at the end, bodies and parts where they are");
+    verb->add_option(
+        "--keep", o->keep,
+        "scene file to write, NAME.kiln.json: what the scene is at the end, bodies and parts where they are");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");
     verb->add_option("--out", o->out, "folder, which must be there, for --png");
-    verb->add_flag("--png", o->png, "a picture of each frame: frame_00000.png and so on");
-    verb->add_option("--size", o->pictures.size, "of the pictures: WIDTHxHEIGHT in pixels")->capture_default_str();
-    verb->add_option("--camera", o->pictures.camera, "of the pictures; left out: the scene's first");
+    CLI::Option* png = verb->add_flag("--png", o->png, "a picture of each frame: frame_00000.png and so on");
+    verb->add_option("--size", o->pictures.size, "of the pictures: WIDTHxHEIGHT in pixels")
+        ->capture_default_str()
+        ->needs(png);
+    verb->add_option("--camera", o->pictures.camera, "of the pictures; left out: the scene's first")->needs(png);
     verb->add_option("--view", o->pictures.view,
                      "of the pictures: as of render, or contacts, shapes, sleeping: lines over the shaded picture")
-        ->capture_default_str();
+        ->capture_default_str()
+        ->needs(png);
     verb->add_option("--device", o->pictures.device, "of the pictures: auto, cpu-vulkan or part of a device's name")
-        ->capture_default_str();
-    verb->add_option("--quality", o->pictures.quality, "of the pictures: low, medium, high, ultra or auto");
+        ->capture_default_str()
+        ->needs(png);
+    verb->add_option("--quality", o->pictures.quality, "of the pictures: low, medium, high, ultra or auto")->needs(png);
     verb->add_flag("--json", o->json, "the ways of all bodies, one object, on stdout");
     verb->callback([o, &run] { run = [o] { return simulate(*o); }; });
 }

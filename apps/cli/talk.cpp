@@ -17,6 +17,12 @@ void say(std::string_view line) {
     (void)std::fwrite(out.data(), 1, out.size(), stderr);
 }
 
+std::string brief(double value, const char* unit) {
+    char buffer[64];
+    std::snprintf(buffer, sizeof buffer, value < 10 ? "%.2f %s" : "%.0f %s", value, unit);
+    return buffer;
+}
+
 int fail(const Error& error) {
     switch (error.kind) {
     case ErrorKind::Usage:

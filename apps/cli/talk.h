@@ -14,6 +14,8 @@ enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBadInput = 3, kNoDevice = 4, kO
 
 /// One line on stderr.
 void say(std::string_view line);
+/// A measure for people: two decimals below 10, else none.
+std::string brief(double value, const char* unit);
 /// Says the error in one line, with a hint where one helps; answers its exit code.
 int fail(const Error& error);
 /// Data on stdout; an answer of false means that nobody could take it (disk full, closed pipe).

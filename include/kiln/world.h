@@ -30,7 +30,7 @@ struct FieldSettings {
     float voxel_size = 0;  ///< metres; 0: longest finite side / 256
     int cells = 64;        ///< a side per level, a power of two (clipmap levels; one level covers the edits)
     int levels = 1;
-    std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %
+    std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %, and their blends with a ground
     bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16
     friend bool operator==(const FieldSettings&, const FieldSettings&) = default;
 };
@@ -225,7 +225,7 @@ public:
     std::vector<std::string> model_notes() const;
     /// Meshes that the scene names and that cannot be read, an error each: they are left out, the rest is drawn.
     std::vector<std::string> faults() const;
-    /// Sections of the scene that this version reads and keeps but does not draw ("bodies", "fluids", …).
+    /// Sections of the scene that this version reads and keeps but does not draw ("cloths", "fluids", …).
     std::vector<std::string> not_drawn_yet() const;
 
     struct Impl;

@@ -60,8 +60,9 @@ constexpr KeyRow kFieldRows[] = {
            "finest voxel; left out: the longest finite side / 256"),
     number("levels", kKept, 1, "1", "integer [1, 16]", "levels of detail, each with voxels twice as large"),
     number("cells", kKept, 64, "1", "integer [8, 512]", "bricks a side per level, a power of two"),
-    inside("bounds", KeyType::Object, kBoundsTable,
-           "what the field covers; left out: the finite edits, inflated by 10 %"),
+    inside(
+        "bounds", KeyType::Object, kBoundsTable,
+        "what the field covers; left out: the finite edits, inflated by 10 %, and as far as they blend with a ground"),
     plain("distance_8bit", KeyType::Bool, "bricks store distance in 8 bits instead of 16"),
 };
 constexpr KeyRow kMaterialRows[] = {
@@ -157,13 +158,14 @@ constexpr KeyRow kCameraRows[] = {
     numbers("up", 3, KILN_AT(Camera, up), {0, 1, 0}, "1", "any", "direction that is up in the picture"),
     number("fov_y_deg", KILN_AT(Camera, fov_y_deg), 45, "deg", "[1, 170]", "vertical field of view"),
     number("exposure", KILN_AT(Camera, exposure), 1, "1", "> 0", "linear multiplier before the tone map"),
-    choice("tone_map", kToneMaps, "from light to the screen; left out: aces"),
+    choice("tone_map", kToneMaps, "from light to the screen: none, exponential, aces, neutral or agx; left out: aces"),
     plain("auto_exposure", KeyType::Bool, "the picture's middle luminance becomes middle grey; exposure corrects it"),
     number("bloom", KILN_AT(Camera, bloom), 0, "1", "[0, 1]", "share of the light that the lens scatters"),
     number("bloom_size", KILN_AT(Camera, bloom_size), 0.1f, "1", "(0, 1]", "the widest glow, of the picture's height"),
     number("bloom_threshold", KILN_AT(Camera, bloom_threshold), 1, "1", ">= 0",
            "gaussian: what is brighter, exposed, glows"),
-    choice("bloom_kind", kBloomKinds, "glow of many sizes, or a blur of what is bright; left out: pyramid"),
+    choice("bloom_kind", kBloomKinds,
+           "pyramid: glow of many sizes; gaussian: a blur of what is bright; left out: pyramid"),
 };
 constexpr KeyRow kPhysicsRows[] = {
     numbers("gravity", 3, KILN_AT(ScenePhysics, gravity), {0, -9.81f, 0}, "m/s²", "any", "acceleration"),
@@ -178,8 +180,9 @@ constexpr KeyRow kBodyRows[] = {
     plain("edits", KeyType::TextList, "ids of the edits that are its shape"),
     plain("mesh", KeyType::Text, "id of the mesh that is its shape"),
     choice("collision", kCollisions,
-           "of a mesh; either collides as the solid that it bounds, triangles only where it is static"),
-    choice("motion", kMotions, "left out: dynamic"),
+           "of a mesh: convex or triangles; either collides as the solid that it bounds, triangles only where it is "
+           "static"),
+    choice("motion", kMotions, "static, kinematic or dynamic; left out: dynamic"),
     number("density", KILN_AT(SceneBody::Numbers, density), 1000, "kg/m³", "> 0", "of its solid"),
     number("friction", KILN_AT(SceneBody::Numbers, friction), 0.5f, "1", ">= 0", "of its surface"),
     number("restitution", KILN_AT(SceneBody::Numbers, restitution), 0, "1", "[0, 1]", "of its surface"),
@@ -191,7 +194,7 @@ constexpr KeyRow kBodyRows[] = {
     numbers("angular_velocity", 3, KILN_AT(SceneBody::Numbers, angular_velocity), {0, 0, 0}, "rad/s", "any",
             "at the start"),
     number("rolling_friction", KILN_AT(SceneBody::Numbers, rolling_friction), 0, "1", ">= 0", "of its surface"),
-    choice("surface", kSurfaces, "its own, or that of its materials where they say what it is; left out: own"),
+    choice("surface", kSurfaces, "what it touches with: own, or materials where they say what it is; left out: own"),
     plain("settles", KeyType::Bool, "becomes ground where it has slept for two seconds, as what is cut loose does"),
 };
 constexpr KeyRow kTriggerRows[] = {

@@ -41,7 +41,12 @@ Result<World> World::import(const std::string& model, const std::string& scene, 
     constexpr float kHalf = std::numbers::sqrt2_v<float> / 2;
     if (settings.z_up) edit.node.transform.rotation = {-kHalf, 0, 0, kHalf};
     edit.node.material = world.add_material(edit.name, Material{});
-    if (auto added = world.add(std::move(edit)); !added) return Error{added.error().message, ErrorKind::Input};
+    const std::string edit_place = edit.name + ": ";
+    if (auto added = world.add(std::move(edit)); !added) {
+        std::string message = added.error().message;
+        if (message.starts_with(edit_place)) message.erase(0, edit_place.size());  // the caller knows of no edit
+        return Error{std::move(message), ErrorKind::Input};
+    }
     world.cameras.emplace_back("main", scene::framing_camera(world.bounds()));
     return world;
 }

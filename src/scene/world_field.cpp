@@ -32,11 +32,6 @@ constexpr uint32_t kMostBricks = 3u << 16;
 /// the changes of a place takes as long as there are changes.
 size_t most_changes(size_t edits) { return std::clamp<size_t>(edits / 4, 256, 8192); }
 
-float longest_side(const Box3& box) {
-    const vec3 size = box.max - box.min;
-    return std::max({size.x, size.y, size.z});
-}
-
 double cells_of(const Box3& box, float voxel) {
     const vec3 size = box.max - box.min;
     const double cell = double(voxel) * field::kBrickVoxels;
@@ -177,6 +172,8 @@ World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const Fie
         const float least = 2 * out.voxel_size;
         const vec3 grown = max(half, finite.half_extents() + vec3{least, least, least});
         out.bounds = {center - grown, center + grown};
+        // A ground rises towards what blends with it as far as the blend reaches; beyond the bounds it would be bare again, with a step.
+        if (p.unbounded) out.bounds = box_union(out.bounds, p.index.touched());
     }
     return out;
 }

@@ -56,6 +56,17 @@ constexpr int kMostAttempts = 40;
 
 Hash128 hash_of(std::string_view text) { return hash128(std::as_bytes(std::span(text.data(), text.size()))); }
 
+// An error where a word without a dot or a slash is no file: somebody meant a bundled scene.
+Result<void> named(const std::string& path_or_name) {
+    struct stat info {};
+    if (path_or_name.find_first_of("/.") != std::string::npos || ::stat(path_or_name.c_str(), &info) == 0) return {};
+    std::vector<std::string_view> names;
+    for (const scene::BundledScene& file : scene::bundled_files()) names.push_back(file.name);
+    return Error{
+        formatted("{}: neither a file nor a bundled scene; {}", path_or_name, scene::suggestion(path_or_name, names)),
+        ErrorKind::Input};
+}
+
 // A name for what is kept of a journal, that no file has.
 std::string side_file(const std::string& journal) {
     struct stat info {};
@@ -69,25 +80,18 @@ std::string side_file(const std::string& journal) {
 void discard_unfinished_files() noexcept { AtomicFile::remove_temporaries_from_signal(); }
 
 Result<World> World::load(const std::string& path_or_name, int workers, bool past) {
-    struct stat info {};
-    const bool is_name = path_or_name.find('/') == std::string::npos && path_or_name.find('.') == std::string::npos;
     if (is_bundled_scene(path_or_name)) {
         const auto files = scene::bundled_files();
         const auto found =
             std::find_if(files.begin(), files.end(), [&](const auto& file) { return file.name == path_or_name; });
         return parse(found->json, path_or_name);
     }
-    if (is_name && ::stat(path_or_name.c_str(), &info) != 0) {
-        std::vector<std::string_view> names;
-        for (const scene::BundledScene& file : scene::bundled_files()) names.push_back(file.name);
-        return Error{formatted("{}: neither a file nor a bundled scene; {}", path_or_name,
-                               scene::suggestion(path_or_name, names)),
-                     ErrorKind::Input};
-    }
+    if (auto there = named(path_or_name); !there) return there.error();
     for (int attempt = 0;; ++attempt) {
         auto text = read_file(path_or_name);
         if (!text) return text.error();
         const auto is_file = [&](const std::string& path) {
+            struct stat info {};
             return ::stat(path.c_str(), &info) == 0 && S_ISREG(info.st_mode);
         };
         const std::string journal = scene::journal_path(path_or_name), history = scene::past_path(path_or_name);
@@ -317,6 +321,7 @@ Result<void> World::Impl::read_journaled(World& world, std::string text, const s
 }
 
 Result<World> World::open(const std::string& path, int workers) {
+    if (auto there = named(path); !there) return there.error();
     auto first = read_file(path);  // whether it is there at all, before a journal is made beside it
     if (!first) return first.error();
     std::string bytes;

@@ -227,4 +227,9 @@ struct World::Impl {
     std::optional<Baked> baked(const FieldSettings& settings);
 };
 
+inline float longest_side(const Box3& box) {
+    const vec3 size = box.max - box.min;
+    return std::max({size.x, size.y, size.z});
+}
+
 }  // namespace kiln

@@ -104,10 +104,15 @@ Result<Mesh> World::mesh(const MeshSettings& settings) const {
 
     field::FieldOptions options;
     options.voxel_size = cell;
-    options.bounds = (within ? box_intersection(bounds, solid) : bounds).inflated(kMargin * cell);
+    const Box3 meshed = within ? box_intersection(bounds, solid) : bounds;
+    options.bounds = meshed.inflated(kMargin * cell);
     options.workers = settings.workers;
     if (rows.empty() || !positive(options.bounds))
         return Error{"there is nothing to mesh: the world has no edits", ErrorKind::Failed};
+    if (cell > longest_side(meshed))
+        return Error{formatted("a mesh of cells of {} m: what is meshed is {} m long; choose smaller cells", cell,
+                               longest_side(meshed)),
+                     ErrorKind::Usage};
     const vec3 size = (options.bounds.max - options.bounds.min) / (cell * float(field::kBrickVoxels));
     if ((double(size.x) + 2) * (double(size.y) + 2) * (double(size.z) + 2) > kMaxCells)
         return too_fine(cell, "the grid does not fit");

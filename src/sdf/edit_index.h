@@ -65,6 +65,8 @@ public:
     /// Of the solids of finite unions, and of the other finite edits.
     Box3 solids() const { return root_ ? root_->solids : Box3{}; }
     Box3 others() const;
+    /// Of where finite edits can change a surface of what is everywhere: as far around them as they blend.
+    Box3 touched() const { return root_ ? root_->box : Box3{}; }
     /// Largest IndexedEdit::reach.
     float largest_reach() const;
 

@@ -108,6 +108,10 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"export potter -o -", "--format"},
         {"export potter -o - --format fbx", "no such format"},
         {"export potter -o a.glb --format stl", "leave --format out"},
+        {"export potter -o a.glb --cell 9m", "choose smaller cells"},
+        {"render potter -o a.png --reference 0", "above 0"},
+        {"simulate tumble --seconds 1 --keep a.csv", ".kiln.json"},
+        {"simulate tumble --seconds 1 --view depth", "--png"},
         {"import a.obj", "--output"},
         {"import a.obj -o b.kiln.json --unit ft", "mm, cm, m or in"},
         {"import a.obj -o b.kiln.json --up x", "y or z"},
@@ -199,11 +203,13 @@ TEST_F(Cli, BadInputIsThreeWithPlaceAndMend) {
     }
     for (const char* words :
          {"validate none.kiln.json", "validate folder", "validate potte", "query potter --points none.csv",
-          "compare a.png b.png", "import none.obj -o a.kiln.json"}) {
+          "compare a.png b.png", "import none.obj -o a.kiln.json", "view potte --frames 1"}) {
         const Outcome o = run(words);
         EXPECT_EQ(o.code, 3) << words << o.err;
         expect_one_line(o, words);
     }
+    EXPECT_THAT(run("view potte --frames 1").err, HasSubstr("did you mean \"potter\"?"));
+    EXPECT_THAT(run("import none.obj -o a.kiln.json").err, testing::StartsWith("none.obj: cannot be read"));
     write("bad.kiln.json", "{\"format\": 3}");
     EXPECT_THAT(run("validate bad.kiln.json --json").out, HasSubstr("\"valid\": false"));
 }

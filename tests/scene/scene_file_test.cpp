@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "scene/scene_file.h"
 
+#include "base/format.h"
 #include "scene/format.h"
 #include "scene_text.h"
 
@@ -312,11 +313,23 @@ TEST(SceneFile, TheExampleOfTheFormatReads) {
 TEST(SceneFile, EveryKeyOfTheTablesIsInTheDocumentation) {
     std::ifstream in(std::string(KILN_SOURCE_DIR) + "/docs/scene-format.md");
     const std::string page((std::istreambuf_iterator<char>(in)), {});
+    // A word that a key may have: quoted somewhere, or in a line of the key.
+    const auto told = [&](std::string_view key, std::string_view word) {
+        if (page.find(formatted("`{}`", word)) != std::string::npos) return true;
+        if (page.find(formatted("\"{}\"", word)) != std::string::npos) return true;
+        const std::string begin = formatted("\n| `{}` |", key);
+        for (size_t at = page.find(begin); at != std::string::npos; at = page.find(begin, at + 1))
+            if (page.substr(at + 1, page.find('\n', at + 1) - at).find(word) != std::string::npos) return true;
+        return false;
+    };
     for (const Table* table : {&kSceneTable, &kFieldTable, &kMaterialTable, &kLightTable, &kEnvironmentTable,
                                &kCameraTable, &kEditTable, &kNodeTable, &kOutlineTable, &kMeshTable, &kPhysicsTable,
                                &kBodyTable, &kTriggerTable, &kClothTable, &kFluidTable})
-        for (const KeyRow& row : table->rows)
+        for (const KeyRow& row : table->rows) {
             EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`")) << table->name;
+            for (const std::string_view word : row.choices)
+                EXPECT_TRUE(told(row.name, word)) << row.name << ": " << word;
+        }
     for (const auto rows : {sdf::shape_rows(), sdf::warp_rows()})
         for (const sdf::KindRow& row : rows) {
             EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`"));

@@ -242,6 +242,25 @@ TEST(World, TooLargeForThePoolIsCoarserAndSaysSo) {
     EXPECT_NE(world.inspect_json().find("\"coarsened\": " + std::to_string(frame->coarsened)), std::string::npos);
 }
 
+TEST(World, BoundsThatNobodySaidHoldAllOfABlendWithTheGround) {
+    for (const Op op : {Op::Union, Op::Subtract}) {
+        World world;
+        ASSERT_TRUE(world.add({.node = {.shape = Plane{}}}));
+        Edit lump = ball(0.5f);
+        lump.op = op;
+        lump.blend_radius = 1;
+        ASSERT_TRUE(world.add(lump));
+        const auto frame = world.frame();
+        ASSERT_TRUE(frame) << frame.error().message;
+        const Box3 bounds = frame->field->options().bounds;
+        for (int i = 0; i <= 32; ++i) {
+            const float z = bounds.min.z + (bounds.max.z - bounds.min.z) * float(i) / 32;
+            for (const float x : {bounds.min.x, bounds.max.x})
+                EXPECT_NEAR(world.distance({x, 0, z}), 0, 1e-6f) << "the ground is bare at " << x << ", " << z;
+        }
+    }
+}
+
 TEST(World, FramesTheSceneWhenItHasNoCamera) {
     World world;
     ASSERT_TRUE(world.add(ball(2, {10, 0, 0})));
