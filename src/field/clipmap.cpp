@@ -670,9 +670,7 @@ bool Clipmap::work(const BakeBudget& budget, const std::optional<BakeView>& view
             whole = !levels_[size_t(level)].counts.skipped &&
                     fill(level, run, window(level), seen != nullptr ? &(*seen)[size_t(level)] : nullptr);
     };
-    // Where the pool is full the nearest are to have it, seen or not.
-    const bool full = std::any_of(levels_.begin(), levels_.end(), [](const Level& l) { return !l.refused.empty(); });
-    if (missing && limited && view && !full) {
+    if (missing && limited && view) {
         const std::vector<CellGroups> seen = seen_groups(*view);
         fill_all(&seen);
     }
