@@ -4,7 +4,8 @@
 //
 // Order of work: where something that is drawn of the last level is missing, a level of the net (clipmap_net.cpp), its
 // coarsest where there is a budget in time, or without a budget the last level itself, whatever it costs; changes, the oldest and finest first, with half of the budget where cells are missing
-// too; missing cells from coarse levels to fine, in each from the focus outwards. So a cell that is there has the coarser level under it,
+// too; missing cells from coarse levels to fine, in each from the focus outwards, those that the view may show before all others
+// (clipmap_view.cpp). So a cell that is there has the coarser level under it,
 // and one mix of two levels is enough everywhere. What is drawn of a level ends at least a cell within its window just moved, so in a
 // steady flight the last level's shells are made, within the budget, before they are seen.
 
@@ -342,8 +343,8 @@ struct SinkBase {
 
 }  // namespace
 
-// Makes missing cells of a part of the window. True when the level has none left there but refused ones.
-bool Clipmap::fill(int level, Run& run, const CellBox& where) {
+// Makes missing cells of a part of the window, `only` those of some groups. True when the level has none left there but refused ones.
+bool Clipmap::fill(int level, Run& run, const CellBox& where, const CellGroups* only) {
     Level& l = levels_[size_t(level)];
     if (l.blocks.empty()) return true;
     const CellBox window = this->window(level);
@@ -351,7 +352,10 @@ bool Clipmap::fill(int level, Run& run, const CellBox& where) {
     struct Sink : SinkBase<Made> {
         const CellMap& cells;
         const CellBox& where;
-        bool wants(ivec3 c) const { return contains(where, c) && cells.at(c.x, c.y, c.z) == kCellMissing; }
+        uint64_t groups;
+        bool wants(ivec3 c) const {
+            return contains(where, c) && (groups & CellGroups::bit(c)) != 0 && cells.at(c.x, c.y, c.z) == kCellMissing;
+        }
         bool wants(const CellBox& box) const {
             for (int z = box.min.z; z < box.max.z; ++z) {
                 for (int y = box.min.y; y < box.max.y; ++y) {
@@ -380,27 +384,39 @@ bool Clipmap::fill(int level, Run& run, const CellBox& where) {
         const float da = distance_cells(level, a + middle), db = distance_cells(level, b + middle);
         return da != db ? da < db : before(a, b);
     });
-    std::vector<ivec3> left;
-    // Blocks with cells outside of `where` stay queued.
+    // Blocks with cells that are not asked for stay queued.
+    constexpr uint64_t kAllGroups = ~uint64_t(0);
+    const auto groups_of = [&](ivec3 block) { return only != nullptr ? only->of(block) : kAllGroups; };
     const auto inside = [&](ivec3 block) {
+        if (groups_of(block) != kAllGroups) return false;
         const CellBox part = common(cells_of(block), window), here = common(part, where);
         return here.min == part.min && here.max == part.max;
     };
     std::vector<ivec3> outside;
     std::erase_if(l.blocks, [&](ivec3 block) {
-        if (meet(cells_of(block), where)) return false;
+        if (meet(cells_of(block), where) && groups_of(block) != 0) return false;
         outside.push_back(block);
         return true;
     });
+    // A block that has had its share of the budget has its turn again when all have.
+    std::vector<ivec3> left;
     size_t next = 0;
-    while (next < l.blocks.size() && run.goes_on()) {
+    while (run.goes_on()) {
+        if (next == l.blocks.size()) {
+            if (left.empty()) break;
+            l.blocks = std::exchange(left, {});
+            next = 0;
+        }
         const std::span<const ivec3> wave = std::span(l.blocks).subspan(next, run.wave(l.blocks.size() - next));
         next += wave.size();
         std::vector<Made> made(wave.size());
         const uint32_t share = run.bricks == kUnlimited ? kUnlimited : std::max(run.bricks / uint32_t(wave.size()), 1u);
         parallel_for(wave.size(), run.workers, [&](int i) {
             CellMaker maker(*l.program, lattice(level, wave[size_t(i)]));
-            Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline}, l.cells, where};
+            Sink sink{{made[size_t(i)], options_.format, share, run.timed, run.deadline},
+                      l.cells,
+                      where,
+                      groups_of(wave[size_t(i)])};
             maker.run_block(wave[size_t(i)], common(window, where), sink);
         });
         for (size_t i = 0; i < wave.size(); ++i) {
@@ -408,6 +424,8 @@ bool Clipmap::fill(int level, Run& run, const CellBox& where) {
             l.counts.baked += uint32_t(made[i].leaves.size());
             l.counts.cells_made += made[i].cells;
             publish(level, made[i], window);
+            // A block that found no room waits for some with the rest of its cells: those it was refused would be made again first, for ever.
+            if (std::find(l.refused.begin(), l.refused.end(), wave[i]) != l.refused.end()) continue;
             if (made[i].stopped)
                 left.push_back(wave[i]);
             else if (!inside(wave[i]))
@@ -575,7 +593,7 @@ void Clipmap::publish(int level, Made& made, const CellBox& window) {
     update_jumps(l.cells, std::max({size.x, size.y, size.z}) >= options_.cells ? window : reached);
 }
 
-bool Clipmap::work(const BakeBudget& budget) {
+bool Clipmap::work(const BakeBudget& budget, const std::optional<BakeView>& view) {
     KILN_PROFILE("clipmap work");
     ++works_;
     victims_level_ = -1;
@@ -647,8 +665,16 @@ bool Clipmap::work(const BakeBudget& budget) {
         apply_all(run);
     }
     bool whole = true;
-    for (int level = last; level >= 0 && whole; --level)
-        whole = !levels_[size_t(level)].counts.skipped && fill(level, run, window(level));
+    const auto fill_all = [&](const std::vector<CellGroups>* seen) {
+        for (int level = last; level >= 0 && whole; --level)
+            whole = !levels_[size_t(level)].counts.skipped &&
+                    fill(level, run, window(level), seen != nullptr ? &(*seen)[size_t(level)] : nullptr);
+    };
+    if (missing && limited && view) {
+        const std::vector<CellGroups> seen = seen_groups(*view);
+        fill_all(&seen);
+    }
+    fill_all(nullptr);
     apply_all(run);
     for (Level& l : levels_) l.shell = 0;
     if (net_ && !needs_net()) drop_net();

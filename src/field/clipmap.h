@@ -10,6 +10,7 @@
 // are kept by copying. Reading is for any thread; changing is the owner's.
 #pragma once
 
+#include "field/cell_groups.h"
 #include "field/cell_maker.h"
 #include "field/field.h"
 #include "field/levels.gpu.h"
@@ -47,6 +48,12 @@ struct BakeBudget {
     uint32_t layers = std::numeric_limits<uint32_t>::max();
 };
 
+/// What a picture can show: a pyramid from the eye. Corners are along forward + right + up and so on, which are at right angles.
+struct BakeView {
+    dvec3 eye;  ///< world, metres
+    vec3 forward, right, up;
+};
+
 /// Of one level; what is counted since the last move() or work() began is said so.
 struct LevelCounts {
     uint32_t bricks = 0;         ///< resident
@@ -69,8 +76,8 @@ public:
     void move(dvec3 focus_world);
     /// The world is `program` now, which is the last one with `changes` made.
     void edit(std::shared_ptr<const sdf::Program> program, std::span<const RowChange> changes);
-    /// Bakes what is queued, within the budget. True when nothing is left.
-    bool work(const BakeBudget& budget = {});
+    /// Bakes what is queued, within the budget. True when nothing is left. Cells that the view may show come first; nothing else depends on it.
+    bool work(const BakeBudget& budget = {}, const std::optional<BakeView>& view = {});
 
     const ClipmapOptions& options() const { return options_; }
     int level_count() const { return options_.levels; }
@@ -187,7 +194,8 @@ private:
     void queue_blocks(Level& level, const CellBox& box) const;
     void begin(Batch& batch, int level) const;
     void add_parts(Batch& batch, const CellBox& clip) const;
-    bool fill(int level, Run& run, const CellBox& where);
+    bool fill(int level, Run& run, const CellBox& where, const CellGroups* only = nullptr);
+    std::vector<CellGroups> seen_groups(const BakeView& view) const;
     bool apply(int level, Run& run);
     void publish(int level, Made& made, const CellBox& window);
     void lose(int level, ivec3 cell);

@@ -15,8 +15,11 @@
 #include <kiln/shapes.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 namespace kiln::measure {
 namespace {
@@ -91,6 +94,7 @@ public:
         if (wanted("fast")) fly("fast", kFast, 300, 0);
         if (wanted("teleport")) fly("teleport", 60 * kTeleports, 10, 60);
         if (wanted("rush")) fly("rush", 60 * kTeleports, 10, 60, kSeconds);
+        if (wanted("arrive")) arrive();
         if (wanted("dig")) dig();
         if (wanted("move.1000")) move();
     }
@@ -182,6 +186,53 @@ private:
         report(name, flight, *map);
     }
 
+    // Frames after a leap until every ray of a picture ends where it does when all is made: with what the picture sees made first, beside
+    // the order without it.
+    void arrive() {
+        run_.stage("arrive");
+        const double side = double(kSpacing) * std::sqrt(double(run_.options.count));
+        const dvec3 from{-0.4 * side, 2, 0.1}, to{0.4 * side, 2, 3.1};
+        const float half_height = 0.5f;
+        const field::BakeView view{to, {1, 0, 0}, {0, 0, half_height * 16 / 9}, {0, half_height, 0}};
+        constexpr int kColumns = 96, kRows = 54;
+        const auto seen = [&](const field::Clipmap& map) {
+            uint64_t out = 0;
+            for (int i = 0; i < kColumns * kRows; ++i) {
+                const float x = 2 * (float(i % kColumns) + 0.5f) / kColumns - 1;
+                const float y = 2 * (float(i / kColumns) + 0.5f) / kRows - 1;
+                const auto hit = map.cast(to, normalize(view.forward + view.right * x + view.up * y), 1e6);
+                out = hash_combine(out, hash_combine(uint64_t(hit.state), std::bit_cast<uint64_t>(hit.t)));
+            }
+            return out;
+        };
+        auto whole = made(to);
+        if (!whole) return run_.fail(whole.error());
+        whole->work();
+        const uint64_t expected = seen(*whole);
+        std::array<double, 2> frames{};
+        for (const bool first : {true, false}) {
+            auto map = made(from);
+            if (!map) return run_.fail(map.error());
+            map->work();
+            map->move(to);
+            uint64_t sees = 0;
+            for (bool done = false; sees != expected && !done; ++frames[first]) {
+                done = map->work({.bricks = kBudget}, first ? std::optional(view) : std::nullopt);
+                sees = seen(*map);
+            }
+            if (!first) continue;
+            map->work();
+            if (hash_of(*map, *whole) != hash_of(*whole, *map) || sees != expected)
+                return run_.fail(Error{"bench world/arrive: what was made is not what a build from nothing makes"});
+        }
+        BenchRow out = row("arrive", frames[1], "frames");
+        out.peer = "without a view";
+        out.peer_value = frames[0];
+        out.ratio = frames[0] / frames[1];
+        out.checksum = hex(expected);
+        run_.add(std::move(out));
+    }
+
     void dig() {
         run_.stage("dig");
         dvec3 at{0.1, 1.5, 0.1};
@@ -244,8 +295,10 @@ BenchFamily world_family() {
     return {
         {"world",
          "a world of six levels flown through at 60 Hz: milliseconds and bricks a frame, the worst frame, memory; the "
-         "same teleports with a budget of 4 ms; digging; a thousand things moving",
-         {"fly", "fast", "teleport", "rush", "dig", "move.1000"}},
+         "same teleports with a budget of 4 ms; frames until what is seen after one is final; digging; a thousand "
+         "things "
+         "moving",
+         {"fly", "fast", "teleport", "rush", "arrive", "dig", "move.1000"}},
         [](BenchRun& run) { WorldRows(run).all(); }};
 }
 

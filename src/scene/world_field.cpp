@@ -251,11 +251,13 @@ std::shared_ptr<const WorldView::Impl> World::Impl::view() {
 
 Box3 World::bounds() const { return impl_->whole()->bounds; }
 
-Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 focus, const FieldSettings& settings,
+Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(const Camera& camera,
+                                                                         const FieldSettings& settings,
                                                                          const FrameBudget& budget) {
     const std::shared_ptr<const sdf::Program> now = compiled();
     const std::lock_guard lock(mutex);
-    const dvec3 at{double(focus.x), double(focus.y), double(focus.z)};
+    const vec3 eye = camera.position;
+    const dvec3 at{double(eye.x), double(eye.y), double(eye.z)};
     if (levels && settings == levels_with) {
         const auto changed = changes_beside(level_changes, levels_apart, apart_rows());
         if (!changed.empty()) levels->edit(now, changed);
@@ -276,8 +278,14 @@ Result<std::shared_ptr<const field::Clipmap>> World::Impl::levels_around(vec3 fo
     }
     level_changes.clear();
     levels_apart = apart_rows();
+    // How wide the picture will be is not known yet.
+    const render::shade::CameraParams seen = render::shade::camera_params(camera, 16, 9);
     levels->work({.bricks = budget.bricks,
-                  .seconds = budget.seconds < 1e9 ? budget.seconds : std::numeric_limits<double>::infinity()});
+                  .seconds = budget.seconds < 1e9 ? budget.seconds : std::numeric_limits<double>::infinity()},
+                 field::BakeView{at,
+                                 {seen.forward.x, seen.forward.y, seen.forward.z},
+                                 {seen.right.x, seen.right.y, seen.right.z},
+                                 {seen.up.x, seen.up.y, seen.up.z}});
     return std::make_shared<const field::Clipmap>(*levels);
 }
 
@@ -304,7 +312,7 @@ Result<Frame> World::frame(const Camera& camera, const FrameBudget& budget) cons
     Frame out;
     out.camera = camera;
     if (field_settings.levels > 1) {
-        auto levels = impl_->levels_around(camera.position, field_settings, budget);
+        auto levels = impl_->levels_around(camera, field_settings, budget);
         if (!levels) return levels.error();
         out.levels = std::move(*levels);
         const field::ClipmapOptions& options = out.levels->options();

@@ -212,8 +212,8 @@ struct World::Impl {
     std::shared_ptr<const sdf::Program> compiled();
     std::shared_ptr<const WorldView::Impl> view();
     Result<Built> field(const FieldSettings& settings);
-    /// The levels around a place, after one frame's baking.
-    Result<std::shared_ptr<const field::Clipmap>> levels_around(vec3 focus, const FieldSettings& settings,
+    /// The levels around the camera, after one frame's baking of what it sees first.
+    Result<std::shared_ptr<const field::Clipmap>> levels_around(const Camera& camera, const FieldSettings& settings,
                                                                 const FrameBudget& budget);
     /// Trilinear in bricks, exact elsewhere; false when there is no field.
     bool sample_bricks(std::span<const vec3> points, const FieldSettings& settings, FieldSample* answers);

@@ -5,27 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace kiln::field {
 namespace {
 
-// A cell that is there has, around it, the coarser level there too.
-void expect_nested(const Clipmap& map, const std::string& when) {
-    int wrong = 0;
-    for (int level = 0; level + 1 < map.level_count(); ++level) {
-        if (map.counts(level + 1).missing_cells == 0) continue;
-        const CellBox coarse = map.window(level + 1);
-        each_cell(map.window(level), [&](ivec3 c) {
-            if (wrong > 3 || map.cell_word(level, c) == kCellMissing) return;
-            each_cell(
-                {{(c.x >> 1) - 1, (c.y >> 1) - 1, (c.z >> 1) - 1}, {(c.x >> 1) + 2, (c.y >> 1) + 2, (c.z >> 1) + 2}},
-                [&](ivec3 n) {
-                    if (!contains(coarse, n) || map.cell_word(level + 1, n) == kCellMissing) ++wrong;
-                });
-        });
-    }
-    EXPECT_EQ(wrong, 0) << when;
-}
+void expect_nested(const Clipmap& map, const std::string& when) { EXPECT_EQ(cells_alone(map), 0) << when; }
 
 TEST(Clipmap, KeepsToItsBudgetAndIsWholeAtOnceAfterATeleport) {
     const auto program = worlds::compiled(country(600));
@@ -214,6 +199,36 @@ TEST(Clipmap, APoolTooSmallGivesTheLeastImportantBricksBack) {
     EXPECT_GT(map.counts(0).evicted, 0u);
     for (int level = 1; level < 4; ++level) EXPECT_EQ(map.counts(level).missing_cells, 0u) << level;
     check("after the change");
+}
+
+// What a view shows is made first also where it is far and the pool has room for the near alone: in the end the nearest are there.
+TEST(Clipmap, APoolTooSmallKeepsTheNearestWhateverTheViewShows) {
+    const auto program = worlds::compiled(country(400));
+    Clipmap whole = made(program, {0, 0.5, 0}, kSmall);
+    whole.work();
+    ClipmapOptions options = kSmall;
+    options.max_bricks = whole.bricks() - whole.counts(0).bricks / 2;
+    const auto filled = [&](const std::optional<BakeView>& view) {
+        Clipmap map = made(program, {300, 0.5, 0}, options);
+        map.work();
+        map.move({0, 0.5, 0});
+        for (int frame = 0; frame < 100; ++frame) map.work({.bricks = 300}, view);
+        return map;
+    };
+    const Clipmap with = filled(BakeView{{0, 0.5, 0}, {1, 0, 0}, {0, 0, 0.7f}, {0, 0.4f, 0}}), without = filled({});
+    EXPECT_EQ(with.bricks(), options.max_bricks);
+    for (int level = 0; level < 4; ++level) EXPECT_EQ(with.counts(level).bricks, without.counts(level).bricks) << level;
+    EXPECT_EQ(with.counts(0).baked, 0u) << "what finds no room is made again and again";
+    EXPECT_EQ(without.counts(0).baked, 0u) << "likewise, without a view";
+    double kept = 0, gone = 1e9;
+    each_cell(with.window(0), [&](ivec3 c) {
+        const double away = std::max({std::fabs(c.x + 0.5), std::fabs(c.y + 0.5), std::fabs(c.z + 0.5)});
+        const uint32_t word = with.cell_word(0, c);
+        if (word == kCellMissing) gone = std::min(gone, away);
+        if ((word & kCellOccupied) != 0 && word != kCellMissing) kept = std::max(kept, away);
+    });
+    EXPECT_LT(kept, gone + 17) << "in blocks of 16 cells";
+    expect_nested(with, "full");
 }
 
 // A change of all levels at once, the last too, is made within the budget, and each level goes over to it when it is whole.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 namespace kiln::field {
 namespace {
@@ -36,6 +37,61 @@ TEST(Clipmap, WhatIsNearIsMadeFirst) {
         }
     }
     EXPECT_GT(looked, 5);
+}
+
+// Where rays of a picture end.
+std::vector<double> ends(const Clipmap& map, const BakeView& view) {
+    std::vector<double> out;
+    for (float y = -0.97f; y < 1; y += 0.06f) {
+        for (float x = -0.98f; x < 1; x += 0.04f) {
+            const auto hit = map.cast(view.eye, normalize(view.forward + view.right * x + view.up * y), 1e6);
+            out.push_back(hit.state == kMarchHit ? hit.t : -1);
+        }
+    }
+    return out;
+}
+
+// Counted without a clock: bricks until the picture is what it will be. The eye looks along no axis, so that pyramids cut blocks.
+TEST(Clipmap, WhatIsSeenIsMadeFirstAndInTheEndNothingDiffers) {
+    const auto program = worlds::compiled(country(600));
+    const ClipmapOptions options{.voxel_size = 0.05f, .levels = 4, .cells = 64};
+    const dvec3 eye{11, 2.5, -7};
+    const vec3 forward = normalize(vec3{-0.8f, -0.1f, 0.6f});
+    const vec3 right = normalize(cross(forward, {0, 1, 0}));
+    const BakeView view{eye, forward, right * 0.7f, cross(right, forward) * 0.4f};
+    Clipmap whole = made(program, eye, options);
+    whole.work();
+    const std::vector<double> expected = ends(whole, view);
+    const auto bricks_until_seen = [&](const std::optional<BakeView>& looks) {
+        Clipmap map = made(program, {600, 0.5, 0}, options);
+        map.work();
+        map.move(eye);
+        uint32_t bricks = 0;
+        bool seen = false, done = false;
+        int nested = 0;
+        for (int frame = 0; frame < 400 && !done; ++frame) {
+            done = map.work({.bricks = 400}, looks);
+            if (frame % 8 == 5) nested += cells_alone(map);
+            for (int level = 0; level < map.all_levels() && !seen; ++level) bricks += map.counts(level).baked;
+            seen = seen || ends(map, view) == expected;
+        }
+        EXPECT_TRUE(done && seen);
+        EXPECT_EQ(nested, 0) << "a cell was made before the coarser level around it";
+        EXPECT_EQ(map.bricks(), whole.bricks());
+        for (int level = 0; level < 4; ++level) {
+            each_cell(map.window(level), [&](ivec3 c) {
+                const uint32_t is = map.cell_word(level, c), was = whole.cell_word(level, c);
+                const bool brick = (is & kCellOccupied) != 0;
+                ASSERT_EQ(brick, (was & kCellOccupied) != 0);
+                if (brick) {
+                    ASSERT_EQ(hash_of(map.content(is & kCellSlotMask)), hash_of(whole.content(was & kCellSlotMask)));
+                }
+            });
+        }
+        return bricks;
+    };
+    const uint32_t first = bricks_until_seen(view), without = bricks_until_seen({});
+    EXPECT_LT(2 * first, without) << first << " bricks, " << without << " in an order that knows no view";
 }
 
 TEST(Clipmap, OlderChangesShowFirstAndEachOnlyWhole) {

@@ -71,6 +71,24 @@ void each_cell(const CellBox& box, F&& fn) {
     }
 }
 
+// A cell that is there has, around it, the coarser level there too: how many have not, up to four.
+inline int cells_alone(const Clipmap& map) {
+    int wrong = 0;
+    for (int level = 0; level + 1 < map.level_count(); ++level) {
+        if (map.counts(level + 1).missing_cells == 0) continue;
+        const CellBox coarse = map.window(level + 1);
+        each_cell(map.window(level), [&](ivec3 c) {
+            if (wrong > 3 || map.cell_word(level, c) == kCellMissing) return;
+            each_cell(
+                {{(c.x >> 1) - 1, (c.y >> 1) - 1, (c.z >> 1) - 1}, {(c.x >> 1) + 2, (c.y >> 1) + 2, (c.z >> 1) + 2}},
+                [&](ivec3 n) {
+                    if (!contains(coarse, n) || map.cell_word(level + 1, n) == kCellMissing) ++wrong;
+                });
+        });
+    }
+    return wrong;
+}
+
 // Every cell that is there has, to the byte, the distances of a field of the level's program. (Materials deep under a cut may differ: they
 // depend on where blocks of cells begin, which is elsewhere in a field. Clipmaps are compared with each other to the last byte.)
 inline void expect_is_its_program(const Clipmap& map, int level, const std::string& when) {
