@@ -2,7 +2,7 @@
 // Bricks of instances in kernels: their field for field/march.gpu.h and field/surface.gpu.h, and the walk of a ray through the tree. The including
 // kernel declares first what atlas.glsl and rays.glsl ask for, and
 //   uint instance_cells[];
-//   for the walk: utexture2D instance_nodes, utexture2D instance_ways, InstancePush push; else: InstanceRecord instances[], InstanceSet sets[];
+//   for the walk: readonly uimage2D instance_nodes, instance_ways (KILN_INSTANCE_TEXTURES: utexture2D), InstancePush push; else: InstanceRecord instances[], InstanceSet sets[];
 //   for KILN_FIELD_SURFACE also utexture3D materials.
 
 #include "field/brick_walk.gpu.h"
@@ -58,14 +58,20 @@ uint field_material(int slot, ivec3 texel) { return brick_material(slot + int(he
 #endif
 
 #ifdef KILN_INSTANCE_WALK
+// Storage images, where a kernel has room for two more among the four that every device has: software loads their texels at a third of the work.
+#ifdef KILN_INSTANCE_TEXTURES
+#define KILN_INSTANCE_TEXEL(image, at) texelFetch(image, at, 0)
+#else
+#define KILN_INSTANCE_TEXEL(image, at) imageLoad(image, at)
+#endif
 // The instance as far as its InstanceWay tells; its set, likewise, becomes the one at hand.
 InstanceRecord instance_at(uint i) {
     ivec2 at = ivec2(8 * int(i % kWaysARow), int(i / kWaysARow));
-    uvec4 eye = texelFetch(instance_ways, at + ivec2(3, 0), 0);
-    uvec4 first = texelFetch(instance_ways, at + ivec2(4, 0), 0);
-    uvec4 size = texelFetch(instance_ways, at + ivec2(5, 0), 0);
-    uvec4 low = texelFetch(instance_ways, at + ivec2(6, 0), 0);
-    uvec4 high = texelFetch(instance_ways, at + ivec2(7, 0), 0);
+    uvec4 eye = KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(3, 0));
+    uvec4 first = KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(4, 0));
+    uvec4 size = KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(5, 0));
+    uvec4 low = KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(6, 0));
+    uvec4 high = KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(7, 0));
     here.grid = GridParams(int(first.x), int(first.y), int(first.z), uintBitsToFloat(first.w), int(size.x), int(size.y), int(size.z), size.w);
     here.slot_first = low.x;
     here.cells_first = low.y;
@@ -76,21 +82,21 @@ InstanceRecord instance_at(uint i) {
     here.high_y = uintBitsToFloat(high.z);
     here.high_z = uintBitsToFloat(high.w);
     InstanceRecord instance;
-    instance.x = uintBitsToFloat(texelFetch(instance_ways, at, 0));
-    instance.y = uintBitsToFloat(texelFetch(instance_ways, at + ivec2(1, 0), 0));
-    instance.z = uintBitsToFloat(texelFetch(instance_ways, at + ivec2(2, 0), 0));
+    instance.x = uintBitsToFloat(KILN_INSTANCE_TEXEL(instance_ways, at));
+    instance.y = uintBitsToFloat(KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(1, 0)));
+    instance.z = uintBitsToFloat(KILN_INSTANCE_TEXEL(instance_ways, at + ivec2(2, 0)));
     instance.eye_x = int(eye.x);
     instance.eye_y = int(eye.y);
     instance.eye_z = int(eye.z);
     instance.voxels = uintBitsToFloat(eye.w);
     return instance;
 }
-float instance_voxels(uint i) { return uintBitsToFloat(texelFetch(instance_ways, ivec2(8 * int(i % kWaysARow) + 3, int(i / kWaysARow)), 0).w); }
+float instance_voxels(uint i) { return uintBitsToFloat(KILN_INSTANCE_TEXEL(instance_ways, ivec2(8 * int(i % kWaysARow) + 3, int(i / kWaysARow))).w); }
 
 InstanceNode node_at(uint i) {
     ivec2 at = ivec2(2 * int(i % kNodesARow), int(i / kNodesARow));
-    uvec4 a = texelFetch(instance_nodes, at, 0);
-    uvec4 b = texelFetch(instance_nodes, at + ivec2(1, 0), 0);
+    uvec4 a = KILN_INSTANCE_TEXEL(instance_nodes, at);
+    uvec4 b = KILN_INSTANCE_TEXEL(instance_nodes, at + ivec2(1, 0));
     return InstanceNode(uintBitsToFloat(a.x), uintBitsToFloat(a.y), uintBitsToFloat(a.z), a.w, uintBitsToFloat(b.x), uintBitsToFloat(b.y), uintBitsToFloat(b.z), b.w);
 }
 

@@ -53,8 +53,8 @@ struct InstanceNode {
     uint instance;  // of a leaf; kNoInstance: it has children
 };
 KILN_CONST uint kNoInstance = 0xffffffffu;
-// Rays read nodes and ways from images, two texels a node and eight a way, so many a row: a software device fetches a texel at once, and a buffer word by
-// word.
+// Rays load nodes and ways from storage images, two texels a node and eight a way, so many a row: a software device loads a texel at once, a buffer word by
+// word, and a texel of a texture only after working out the mip of each ray.
 KILN_CONST uint kNodesARow = 1024u;
 KILN_CONST uint kWaysARow = 256u;
 

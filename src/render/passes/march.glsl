@@ -25,8 +25,8 @@ layout(set = 0, binding = 8, std140) uniform Levels { LevelsParams levels; Level
 #endif
 
 #ifdef KILN_INSTANCES
-layout(set = 0, binding = KILN_NEXT_BINDING) uniform utexture2D instance_ways;
-layout(set = 0, binding = KILN_NEXT_BINDING + 1) uniform utexture2D instance_nodes;
+layout(set = 0, binding = KILN_NEXT_BINDING, rgba32ui) readonly uniform uimage2D instance_ways;
+layout(set = 0, binding = KILN_NEXT_BINDING + 1, rgba32ui) readonly uniform uimage2D instance_nodes;
 layout(set = 0, binding = KILN_NEXT_BINDING + 2, std430) readonly buffer InstanceCells { uint instance_cells[]; };
 layout(push_constant) uniform Push { InstancePush push; };
 #endif

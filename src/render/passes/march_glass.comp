@@ -11,8 +11,8 @@
 layout(local_size_x = kTileGroup, local_size_y = kTileGroup) in;
 
 layout(set = 0, binding = 0, std140) uniform Frame { FrameParams frame; };
-layout(set = 0, binding = 1) uniform utexture2D instance_ways;
-layout(set = 0, binding = 2) uniform utexture2D instance_nodes;  // of glass
+layout(set = 0, binding = 1, rgba32ui) readonly uniform uimage2D instance_ways;
+layout(set = 0, binding = 2, rgba32ui) readonly uniform uimage2D instance_nodes;  // of glass
 layout(set = 0, binding = 3, std430) readonly buffer Cells { uint instance_cells[]; };
 layout(set = 0, binding = 4, std430) readonly buffer Rays { FrameRay rays[]; };
 layout(set = 0, binding = 5, std430) readonly buffer Tables { uint tables[]; };

@@ -30,6 +30,7 @@ layout(push_constant) uniform Push { InstancePush push; };
 
 #define KILN_FROM_INSIDE
 #define KILN_INSTANCE_WALK
+#define KILN_INSTANCE_TEXTURES
 #include "render/lib/glass.gpu.h"
 #include "render/passes/instances.glsl"
 #include "render/passes/rays.glsl"
