@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 float ring(vec3 p, float r) { return length(vec2(length(p.xz) - r, p.y)) - 0.1; }
 float shape(vec3 p) {
     float d = 1e9;
