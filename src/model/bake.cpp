@@ -8,7 +8,7 @@
 #include "model/bake.h"
 
 #include "model/lipschitz.h"
-#include "model/surface.h"
+#include "model/triangle_tree.h"
 
 #include "base/format.h"
 #include "base/parallel_for.h"
@@ -51,13 +51,13 @@ public:
 
     Result<Baked> run(const std::string& name) {
         place();
-        const Surface whole(local_, mesh_.faces);
+        const TriangleTree whole(local_, mesh_.faces);
         whole_ = surface_ = &whole;
         coarse_level();
         surface_bricks();
         sample(0);
         // Parts that lie in each other: what is inside the solid is not its surface.
-        std::optional<Surface> outer;
+        std::optional<TriangleTree> outer;
         if (overlaps()) {
             std::vector<Face> faces = separating_pieces();
             report_.overlapping = true;
@@ -68,7 +68,7 @@ public:
             surface_bricks();
             sample(0);
         }
-        std::optional<Surface> cap;
+        std::optional<TriangleTree> cap;
         if (!report_.topology.balanced) {
             follow_openings();
             cap.emplace(cap_positions_, cap_faces_);
@@ -508,7 +508,7 @@ private:
                 }
     }
 
-    void reach_of(const Surface& cap) {
+    void reach_of(const TriangleTree& cap) {
         parallel_for(bricks_.size(), options_.workers, [&](int n) {
             const Brick& b = bricks_[size_t(n)];
             for (int s = 0; s < kBrickSamples; ++s) {
@@ -642,8 +642,8 @@ private:
     const Triangles& mesh_;
     const BakeOptions& options_;
     BakeReport report_;
-    const Surface* whole_ = nullptr;    // whose winding number counts
-    const Surface* surface_ = nullptr;  // whose distance counts
+    const TriangleTree* whole_ = nullptr;    // whose winding number counts
+    const TriangleTree* surface_ = nullptr;  // whose distance counts
     std::vector<vec3> local_;
     vec3 middle_, lo_, hi_;
     Box3 solid_;

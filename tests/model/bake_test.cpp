@@ -4,7 +4,7 @@
 
 #include "meshes.h"
 
-#include "model/surface.h"
+#include "model/triangle_tree.h"
 
 #include <gmock/gmock.h>
 
@@ -25,9 +25,9 @@ std::vector<std::pair<const char*, Triangles>> samples() {
             {"hemisphere", hemisphere(3)},  {"soup", soup(random, 300)},    {"needles", needles}};
 }
 
-TEST(Surface, DistanceIsThatOfTheNearestTriangle) {
+TEST(TriangleTree, DistanceIsThatOfTheNearestTriangle) {
     for (const auto& [name, mesh] : samples()) {
-        const Surface surface(mesh.positions, mesh.faces);
+        const TriangleTree surface(mesh.positions, mesh.faces);
         Random random(1);
         int32_t near = -1;
         for (int i = 0; i < 500; ++i) {
@@ -41,9 +41,9 @@ TEST(Surface, DistanceIsThatOfTheNearestTriangle) {
     }
 }
 
-TEST(Surface, WindingNumberIsTheSumOfSolidAngles) {
+TEST(TriangleTree, WindingNumberIsTheSumOfSolidAngles) {
     for (const auto& [name, mesh] : samples()) {
-        const Surface surface(mesh.positions, mesh.faces);
+        const TriangleTree surface(mesh.positions, mesh.faces);
         Random random(2);
         for (int i = 0; i < 300; ++i) {
             const vec3 p = random.point(1.2f);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 
-#include "model/surface.h"
+#include "model/triangle_tree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -46,7 +46,8 @@ Four off_edge(const Four* p, const Four* e, Four inverse) {
 
 }  // namespace
 
-Surface::Surface(std::span<const vec3> positions, std::span<const Face> faces) : positions_(positions), faces_(faces) {
+TriangleTree::TriangleTree(std::span<const vec3> positions, std::span<const Face> faces)
+    : positions_(positions), faces_(faces) {
     if (faces.empty()) return;
     std::vector<uint32_t> order(faces.size());
     middles_.resize(faces.size());
@@ -76,7 +77,7 @@ Surface::Surface(std::span<const vec3> positions, std::span<const Face> faces) :
     faces_ = {};
 }
 
-int32_t Surface::make_leaf(std::span<const uint32_t> range, Group& group) {
+int32_t TriangleTree::make_leaf(std::span<const uint32_t> range, Group& group) {
     Leaf leaf;
     group = {};
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -141,7 +142,7 @@ int32_t Surface::make_leaf(std::span<const uint32_t> range, Group& group) {
     return ~int32_t(leaves_.size() - 1);
 }
 
-int32_t Surface::build(std::span<uint32_t> range, Group& group) {
+int32_t TriangleTree::build(std::span<uint32_t> range, Group& group) {
     if (range.size() <= 4) return make_leaf(range, group);
     const auto halves = [&](std::span<uint32_t> whole) {
         vec3 lo = middles_[whole[0]], hi = lo;
@@ -210,7 +211,7 @@ int32_t Surface::build(std::span<uint32_t> range, Group& group) {
     return int32_t(nodes_.size() - 1);
 }
 
-float Surface::leaf_distance(const Leaf& leaf, const Four* p, float bound) {
+float TriangleTree::leaf_distance(const Leaf& leaf, const Four* p, float bound) {
     const Four q[3] = {p[0] - leaf.a[0], p[1] - leaf.a[1], p[2] - leaf.a[2]};
     const Four u = dot4(q, leaf.u), v = dot4(q, leaf.v), height = dot4(q, leaf.n);
     const Four from_b[3] = {q[0] - leaf.ab[0], q[1] - leaf.ab[1], q[2] - leaf.ab[2]};
@@ -223,7 +224,7 @@ float Surface::leaf_distance(const Leaf& leaf, const Four* p, float bound) {
     return bound;
 }
 
-float Surface::squared_distance(vec3 point, float bound, int32_t* near) const {
+float TriangleTree::squared_distance(vec3 point, float bound, int32_t* near) const {
     if (nodes_.empty()) return bound;
     const Four p[3] = {all(point.x), all(point.y), all(point.z)};
     // The leaf that was nearest to a point near by is seldom far from the nearest one now.
@@ -264,7 +265,7 @@ float Surface::squared_distance(vec3 point, float bound, int32_t* near) const {
     return bound;
 }
 
-float Surface::winding(vec3 point) const {
+float TriangleTree::winding(vec3 point) const {
     if (nodes_.empty()) return 0;
     const Four p[3] = {all(point.x), all(point.y), all(point.z)};
     int32_t stack[128];

@@ -15,10 +15,10 @@ namespace kiln::model {
 
 typedef float Four __attribute__((vector_size(16)));
 
-class Surface {
+class TriangleTree {
 public:
     /// Positions near the origin: floats are finest there.
-    Surface(std::span<const vec3> positions, std::span<const Face> faces);
+    TriangleTree(std::span<const vec3> positions, std::span<const Face> faces);
 
     bool empty() const { return nodes_.empty(); }
     /// Squared distance to the nearest triangle, or `bound` where all are farther. `near` carries a hint from one point to the next
