@@ -5,6 +5,7 @@
 #include "meshes.h"
 
 #include "model/triangle_tree.h"
+#include "rounds.h"
 
 #include <gmock/gmock.h>
 
@@ -121,7 +122,7 @@ TEST(Bake, IsOneLipschitz) {
             EXPECT_LT(s.baked.report.divisor, 1.8f) << name;
             Random random(6);
             double worst = 0;
-            for (int i = 0; i < 20000; ++i) {
+            for (int i = 0; i < rounds(20000); ++i) {
                 const vec3 p = random.point(i % 8 == 0 ? 4.0f : 1.3f);
                 const vec3 q = p + random.point(s.cell() * (i % 4 == 0 ? 5.0f : 0.3f));
                 const double far = (Vector(p) - Vector(q)).length();
