@@ -295,9 +295,8 @@ BenchFamily world_family() {
     return {
         {"world",
          "a world of six levels flown through at 60 Hz: milliseconds and bricks a frame, the worst frame, memory; the "
-         "same teleports with a budget of 4 ms; frames until what is seen after one is final; digging; a thousand "
-         "things "
-         "moving",
+         "same teleports with a budget of 4 ms; frames until what is seen after one is final; digging; a "
+         "thousand things moving",
          {"fly", "fast", "teleport", "rush", "arrive", "dig", "move.1000"}},
         [](BenchRun& run) { WorldRows(run).all(); }};
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include "base/record_file.h"
+#include "complaint.h"
 #include "scene/command.h"
 #include "scene/heights.h"
 #include "scene/scene_file.h"
@@ -21,12 +22,7 @@ namespace kiln::scene {
 // A scene, which is saved and read again unchanged, or an error of kind Input of one line with a place.
 inline std::string scene_complaint(const std::string& text) {
     const auto scene = read_scene(text, "f.json");
-    if (!scene) {
-        const std::string& message = scene.error().message;
-        if (scene.error().kind != ErrorKind::Input) return "kind of: " + message;
-        if (!message.starts_with("f.json:")) return "no place: " + message;
-        return message.find('\n') == std::string::npos ? "" : "several lines: " + message;
-    }
+    if (!scene) return error_complaint(scene.error(), "f.json");
     const std::string saved = write_scene(*scene, scene->stage);
     const auto again = read_scene(saved, "f.json");
     if (!again) return again.error().message + "\n" + saved.substr(0, 2000);
@@ -44,11 +40,7 @@ inline std::string payload_complaint(const std::string& text) {
     const CommandNames names{scene.material_numbers, scene.object_numbers,
                              [&](std::string_view name) { return name.empty() ? nullptr : &lump; }};
     const auto command = read_command(text, "f.journal", names);
-    if (!command) {
-        const std::string& message = command.error().message;
-        if (command.error().kind != ErrorKind::Input) return "kind of: " + message;
-        return message.starts_with("f.journal:") ? "" : "no place: " + message;
-    }
+    if (!command) return error_complaint(command.error(), "f.journal");
     const auto written = [&](const Command& c) {
         return write_command(scene, c.stage,
                              {c.kind, c.id, c.before, c.edit.get(), c.material ? &*c.material : nullptr,
@@ -80,10 +72,7 @@ inline std::string heights_complaint(std::span<const uint8_t> bytes) {
     const std::string path = "/proc/self/fd/" + std::to_string(file);
     const auto grid = load_heights(path);
     close(file);
-    if (!grid) {
-        if (grid.error().kind != ErrorKind::Input) return "kind of: " + grid.error().message;
-        return grid.error().message.starts_with(path) ? "" : "no file named: " + grid.error().message;
-    }
+    if (!grid) return error_complaint(grid.error(), path);
     if (grid->columns < 2 || grid->rows < 2) return "less than 2 x 2";
     if (grid->values.size() != size_t(grid->columns) * size_t(grid->rows)) return "columns x rows are not its numbers";
     for (const float v : grid->values)

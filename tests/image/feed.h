@@ -2,9 +2,8 @@
 // What every reader of pictures promises of any bytes, for the deterministic tests and for libFuzzer: the broken promise, or nothing.
 #pragma once
 
+#include "complaint.h"
 #include "image/image.h"
-
-#include <kiln/result.h>
 
 #include <string>
 
@@ -13,12 +12,7 @@ namespace kiln::image {
 // Pixels: Pixels or FloatPixels. `name` is the file's, as the reader was told.
 template <typename Pixels>
 std::string pixels_complaint(const Result<Pixels>& picture, const std::string& name) {
-    if (!picture) {
-        const Error& error = picture.error();
-        if (error.kind != ErrorKind::Input) return "kind of: " + error.message;
-        if (!error.message.starts_with(name + ": ")) return "no file named: " + error.message;
-        return error.message.find('\n') == std::string::npos ? "" : "several lines: " + error.message;
-    }
+    if (!picture) return error_complaint(picture.error(), name);
     if (picture->width < 1 || picture->height < 1 || picture->width > kMaxSide || picture->height > kMaxSide)
         return "a picture of " + std::to_string(picture->width) + " x " + std::to_string(picture->height);
     if (picture->channels < 1 || picture->channels > 4) return std::to_string(picture->channels) + " channels";

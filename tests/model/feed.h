@@ -3,6 +3,7 @@
 // nothing. `name` is the file's, as the reader was told.
 #pragma once
 
+#include "complaint.h"
 #include "model/drawable.h"
 #include "model/triangles.h"
 
@@ -13,13 +14,6 @@
 #include <string_view>
 
 namespace kiln::model {
-
-// One line of kind Input that begins with the file's name.
-inline std::string error_complaint(const Error& error, const std::string& name) {
-    if (error.kind != ErrorKind::Input) return "kind of: " + error.message;
-    if (!error.message.starts_with(name + ":")) return "no file named: " + error.message;
-    return error.message.find('\n') == std::string::npos ? "" : "several lines: " + error.message;
-}
 
 inline std::string triangles_complaint(const Result<Triangles>& mesh, const std::string& name) {
     if (!mesh) return error_complaint(mesh.error(), name);
