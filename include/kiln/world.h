@@ -27,8 +27,9 @@ class Simulation;
 }
 
 struct FieldSettings {
-    float voxel_size = 0;  ///< metres; 0: longest finite side / 256
-    int cells = 64;        ///< a side per level, a power of two (clipmap levels; one level covers the edits)
+    float voxel_size =
+        0;  ///< metres; 0: longest finite side / 256 when the field is made; edits that change it by less than 10 % keep it
+    int cells = 64;  ///< a side per level, a power of two (clipmap levels; one level covers the edits)
     int levels = 1;
     std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %, and their blends with a ground
     bool distance_8bit = false;  ///< bricks store distance in 8 bits instead of 16

@@ -32,6 +32,10 @@ constexpr uint32_t kMostBricks = 3u << 16;
 /// the changes of a place takes as long as there are changes.
 size_t most_changes(size_t edits) { return std::clamp<size_t>(edits / 4, 256, 8192); }
 
+/// An edit at the rim moves the bounds that the edits ask for, and with them the voxel size. A grid stays while it holds what it must and
+/// both differ by no more than this: else a stroke there would make every brick anew with each of its edits.
+constexpr float kKeptGrid = 1.1f;
+
 double cells_of(const Box3& box, float voxel) {
     const vec3 size = box.max - box.min;
     const double cell = double(voxel) * field::kBrickVoxels;
@@ -165,17 +169,28 @@ World::Impl::Resolution World::Impl::resolution(const sdf::Program& p, const Fie
         finite = p.unbounded ? Box3{{-5, -5, -5}, {5, 5, 5}} : Box3{{-0.5f, -0.5f, -0.5f}, {0.5f, 0.5f, 0.5f}};
     out.voxel_size = settings.voxel_size > 0 ? settings.voxel_size : std::max(longest_side(finite) / 256, 1e-6f);
     if (settings.bounds) {
-        out.bounds = *settings.bounds;
+        out.bounds = out.least = *settings.bounds;
     } else {
         // Inflated by 10 %, and by two voxels where the scene is flat.
         const vec3 center = finite.center(), half = finite.half_extents() * 1.1f;
         const float least = 2 * out.voxel_size;
         const vec3 grown = max(half, finite.half_extents() + vec3{least, least, least});
         out.bounds = {center - grown, center + grown};
+        out.least = finite.inflated(least);
         // A ground rises towards what blends with it as far as the blend reaches; beyond the bounds it would be bare again, with a step.
-        if (p.unbounded) out.bounds = box_union(out.bounds, p.index.touched());
+        if (p.unbounded) {
+            out.bounds = box_union(out.bounds, p.index.touched());
+            out.least = box_union(out.least, p.index.touched());
+        }
     }
     return out;
+}
+
+bool World::Impl::still_serves(const field::FieldOptions& has, const Resolution& asked, const FieldSettings& settings) {
+    if (has.voxel_size < asked.voxel_size / kKeptGrid || has.voxel_size > asked.voxel_size * kKeptGrid) return false;
+    if (settings.bounds) return has.bounds == asked.bounds;
+    return has.bounds.contains(asked.least.min) && has.bounds.contains(asked.least.max) &&
+           longest_side(has.bounds) <= longest_side(asked.bounds) * kKeptGrid;
 }
 
 Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
@@ -190,8 +205,8 @@ Result<World::Impl::Built> World::Impl::field(const FieldSettings& settings) {
         return Error{"field_settings.bounds must be finite, with min below max", ErrorKind::Usage};
     const Resolution r = resolution(list, settings);
     Built next;
-    if (comparable && built.coarsened == 0 && built.field->options().voxel_size == r.voxel_size &&
-        built.field->options().bounds == r.bounds && changes.size() <= most_changes(edits.size())) {
+    if (comparable && built.coarsened == 0 && still_serves(built.field->options(), r, settings) &&
+        changes.size() <= most_changes(edits.size())) {
         const std::vector<field::RowChange> changed = changes_beside(changes, built_apart, apart);
         if (changed.empty()) {
             built_apart = std::move(apart);

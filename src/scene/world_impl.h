@@ -125,8 +125,11 @@ struct World::Impl {
     struct Resolution {
         float voxel_size = 0;
         Box3 bounds;
+        Box3 least;  ///< of the bounds, what must be inside: the rest is room to grow
     };
     Resolution resolution(const sdf::Program& program, const FieldSettings& settings) const;
+    /// Whether a grid made with these options need not be made anew for what is asked now.
+    static bool still_serves(const field::FieldOptions& has, const Resolution& asked, const FieldSettings& settings);
 
     struct Built {
         std::shared_ptr<const field::Field> field;

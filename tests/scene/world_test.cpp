@@ -489,6 +489,39 @@ TEST(World, NearestWord) {
     EXPECT_EQ(nearest_word("", known), "");
 }
 
+TEST(World, AnEditAtTheRimKeepsTheGridUntilItNoLongerServes) {
+    std::string edits;
+    for (int i = 0; i < 216; ++i)
+        edits += (i ? "," : "") + std::string("{\"shape\":\"sphere\",\"radius\":0.3,\"position\":[") +
+                 std::to_string(i % 6) + "," + std::to_string(i / 6 % 6) + "," + std::to_string(i / 36) + "]}";
+    auto world = World::parse(scene_with(edits), "s.json");
+    ASSERT_TRUE(world) << world.error().message;
+    const auto options = [&] { return world->frame()->field->options(); };
+    const auto baked = [&] { return world->frame()->field->stats().bricks_baked; };
+    const field::FieldOptions made = options();
+    EXPECT_FLOAT_EQ(made.voxel_size, 5.6f / 256);
+    const auto whole = baked();
+    const EditId last = world->edits().back();
+    const auto with_radius = [&](float radius) {
+        Edit changed = *world->find(last);
+        changed.node.shape = Sphere{.radius = radius};
+        ASSERT_TRUE(world->change(last, changed));
+    };
+    // Within the room that the bounds have: only what the ball reaches.
+    with_radius(0.45f);
+    EXPECT_LT(baked(), whole / 20);
+    EXPECT_EQ(options().bounds, made.bounds);
+    EXPECT_EQ(options().voxel_size, made.voxel_size);
+    // Beyond them: a new grid, which holds the ball.
+    with_radius(0.7f);
+    EXPECT_TRUE(options().bounds.contains({5.7f, 5.7f, 5.7f}));
+    EXPECT_FLOAT_EQ(options().voxel_size, 6 / 256.0f);
+    // A world that shrinks gets its finer voxels.
+    const std::vector<EditId> all = world->edits();
+    for (size_t i = 1; i < all.size(); ++i) ASSERT_TRUE(world->remove(all[i]));
+    EXPECT_FLOAT_EQ(options().voxel_size, 0.6f / 256);
+}
+
 // KILN_MILLION=1 for the full size; a fifth of it takes seconds.
 TEST(WorldSlow, HundredsOfThousandsOfEditsLoadAndAreEdited) {
     const int count = std::getenv("KILN_MILLION") ? 1000000 : 200000;
