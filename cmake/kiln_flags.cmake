@@ -31,3 +31,21 @@ if(KILN_SANITIZE)
     add_compile_options(-fsanitize=${KILN_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
     add_link_options(-fsanitize=${KILN_SANITIZE})
 endif()
+
+# kiln_together(TARGET FILES): compiles eight at a time where KILN_TOGETHER is on. Files that set macros stay alone: the texts shared with
+# shaders are read once for each language. Preset dev compiles each file by itself, which shows what one forgot to include.
+function(kiln_together target files)
+    if(NOT KILN_TOGETHER)
+        return()
+    endif()
+    foreach(file IN LISTS files)
+        file(STRINGS ${file} macros REGEX "^#define " LIMIT_COUNT 1)
+        if(macros)
+            set_source_files_properties(${file} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
+        endif()
+    endforeach()
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+        target_compile_options(${target} PRIVATE -Wno-subobject-linkage)  # of types in a file that is not the main one
+    endif()
+endfunction()

@@ -30,6 +30,8 @@ struct dvec3 {
     friend bool operator==(const dvec3&, const dvec3&) = default;
 };
 
+constexpr dvec3 wide(vec3 a) { return {a.x, a.y, a.z}; }
+
 /// Rotation, (x, y, z, w) with w the scalar part; unit length.
 struct quat {
     float x = 0, y = 0, z = 0, w = 1;

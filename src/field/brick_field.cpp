@@ -16,7 +16,7 @@ namespace {
 constexpr int kMostProbes = 32;
 constexpr int kMostCell = kNearCells - 1;  // beyond, floats of texels are too coarse
 constexpr uint64_t kUsed = uint64_t(1) << 63;
-constexpr float kHalfDiagonal = 0.8661f;  // of a side
+constexpr float kHalfDiagonalOfSide = 0.8661f;  // of a side
 constexpr size_t kBodyBricks = 1 << 13;
 constexpr size_t kLeastRoom = 1 << 12;  // cells
 constexpr size_t kMostBefore = 8;       // tables that bricks are taken over from
@@ -104,7 +104,7 @@ std::shared_ptr<const BrickField> BrickField::after(std::shared_ptr<const SdfFie
     const size_t room = std::clamp(2 * asked, std::min(kLeastRoom, room_), 2 * most);
     auto out = std::make_shared<BrickField>(std::move(exact), options_, Room{room});
     // A value can change only where the change is nearer than the value is large, and bricks hold values up to `near` and a diagonal.
-    const float reach = options_.near + 3 * kHalfDiagonal * kBrickVoxels * options_.voxel_size;
+    const float reach = options_.near + 3 * kHalfDiagonalOfSide * kBrickVoxels * options_.voxel_size;
     out->before_.push_back({table_, changed.empty() ? changed : changed.inflated(reach)});
     // As many as one may have is as many as are kept for those who have others.
     size_t bricks = table_->bricks.load(std::memory_order_relaxed);

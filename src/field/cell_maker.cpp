@@ -7,8 +7,8 @@
 namespace kiln::field {
 namespace {
 
-constexpr float kHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
-constexpr int kFarCell = 1 << 28;            // beyond any cell that has texels
+constexpr float kCellHalfDiagonal = 6.0621779f;  // of a cell, voxels: 3.5 * sqrt(3), rounded up
+constexpr int kFarCell = 1 << 28;                // beyond any cell that has texels
 
 }  // namespace
 
@@ -114,7 +114,7 @@ void CellMaker::place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const
 // One radius for all.
 void CellMaker::size_balls(sdf::Balls& balls, int size) const {
     const float h = lattice_.voxel_size, rounding = 5e-7f * lattice_.farthest;
-    balls.radius = kHalfDiagonal * float(size) * h + rounding;
+    balls.radius = kCellHalfDiagonal * float(size) * h + rounding;
     balls.half_side = 3.5f * float(size) * h + rounding;
     balls.far = far_;
 }

@@ -12,11 +12,11 @@
 namespace kiln::field {
 namespace {
 
-struct Reader {
+struct LevelsReader {
     const Clipmap& map;
     LevelsParams levels;
 
-    explicit Reader(const Clipmap& clipmap) : map(clipmap), levels(clipmap.params()) {}
+    explicit LevelsReader(const Clipmap& clipmap) : map(clipmap), levels(clipmap.params()) {}
 
     ivec3 level_first_cell(int level) const { return map.first_cell(level); }
     uint level_word(int level, ivec3 cell) const { return map.cell_word(level, cell); }
@@ -41,7 +41,7 @@ struct Reader {
 }  // namespace
 
 Clipmap::Sample Clipmap::sample(dvec3 p_world) const {
-    Reader reader(*this);
+    LevelsReader reader(*this);
     Sample out;
     const double h = double(options_.voxel_size);
     const double away =
@@ -72,7 +72,7 @@ Clipmap::Sample Clipmap::sample(dvec3 p_world) const {
 }
 
 Clipmap::Hit Clipmap::cast(dvec3 origin_world, vec3 direction, double t_max, bool accelerate) const {
-    Reader reader(*this);
+    LevelsReader reader(*this);
     const double h = double(options_.voxel_size);
     const LevelHit found = reader.level_march(texel_ray_of(origin_world, direction, options_.voxel_size), 0.0f,
                                               float(std::min(t_max / h, double(kFarVoxels))), accelerate);

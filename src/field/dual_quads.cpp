@@ -14,7 +14,7 @@ namespace {
 
 typedef int32_t int4 __attribute__((vector_size(16)));
 
-constexpr int kRowGrain = 2;
+constexpr int kQuadRowGrain = 2;
 constexpr float kNearCrossing = 0.125f;  // of the way to the other crossing
 constexpr float kWall = 1e-4f;           // voxels a quad keeps from its room's walls, for rounding
 
@@ -235,7 +235,7 @@ void DualQuads::make(std::vector<FacePath> paths, const ExactBrick& exact, int w
                 const MeshBricks::Row& row = bricks.rows()[size_t(i)];
                 for (size_t brick = row.first; brick < row.end; ++brick) fn(brick);
             },
-            kRowGrain);
+            kQuadRowGrain);
     };
     ways_.resize(edges_.edge_count());
     std::vector<Counts> first(count + 1);

@@ -29,7 +29,7 @@ namespace {
 constexpr int kTaskPages = kBlockCells / kCellPage;
 constexpr int64_t kMaxCells = 1ll << 28;
 constexpr int64_t kMaxTexel = 1ll << 24;  // float holds every integer up to here
-constexpr int64_t kFewCells = 4096;       // an update of fewer takes them as they come
+constexpr int64_t kUnsortedCells = 4096;  // an update of fewer takes them as they come
 constexpr size_t kFewLeaves = 64;         // and asks for room for so many bricks at first
 
 std::atomic<uint64_t> revisions{0};
@@ -82,7 +82,7 @@ public:
                 cells += int64_t(s.x) * s.y * s.z;
                 all = joined(all, box);
             }
-            if (cells > kFewCells) {
+            if (cells > kUnsortedCells) {
                 build_tasks(all);
             } else if (cells > 0) {
                 results_.resize(dirty_.size());

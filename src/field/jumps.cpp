@@ -14,8 +14,7 @@
 namespace kiln::field {
 namespace {
 
-constexpr int kReach = kMaxJump - 1;  // from further away a brick changes no jump
-static_assert(kReach == 6);
+static_assert(kJumpReach == 6);
 
 // Rows of cells, [y0, y1) x [z0, z1).
 struct Rows {
@@ -112,9 +111,9 @@ CellBox joined(const CellBox& a, const CellBox& b) {
 
 void update_jumps(CellMap& cells, const CellBox& box) {
     if (box.empty()) return;
-    CellBox wide = cells.wraps()
-                       ? CellBox{box.min - ivec3{kReach, kReach, kReach}, box.max + ivec3{kReach, kReach, kReach}}
-                       : grown(box, kReach, cells.size());
+    CellBox wide = cells.wraps() ? CellBox{box.min - ivec3{kJumpReach, kJumpReach, kJumpReach},
+                                           box.max + ivec3{kJumpReach, kJumpReach, kJumpReach}}
+                                 : grown(box, kJumpReach, cells.size());
     wide.min.x &= ~(kCellPage - 1);
     const ivec3 size = wide.max - wide.min;
     BitBox near(size), next(size), by_x(size), by_y(size);
@@ -132,8 +131,8 @@ void update_jumps(CellMap& cells, const CellBox& box) {
     const Rows rows{box.min.y - wide.min.y, box.max.y - wide.min.y, box.min.z - wide.min.z, box.max.z - wide.min.z};
     JumpBits jump(near, rows);
     jump.add(near, 0);
-    for (int k = 1; k <= kReach; ++k) {
-        const int by = kReach - k;  // the dilations to come read so much further
+    for (int k = 1; k <= kJumpReach; ++k) {
+        const int by = kJumpReach - k;  // the dilations to come read so much further
         dilate(near, by_x, by_y, next,
                {std::max(rows.y0 - by, 0), std::min(rows.y1 + by, size.y), std::max(rows.z0 - by, 0),
                 std::min(rows.z1 + by, size.z)});
@@ -160,7 +159,7 @@ namespace {
 // k - 1, and so on down to that brick; and where a jump was k because of a brick that is gone, the same holds of what was. Either way the
 // wave of cells that change starts there, and is followed no further than it reaches, which in a crowd is a cell or two: a window
 // that shows so far is tried first, and one more cell where jumps rise, which is told by what lies around.
-constexpr int kFewCells = 2, kAllCells = kReach + 1;
+constexpr int kFewCells = 2, kAllCells = kJumpReach + 1;
 
 // The jumps around some cells, a bit a cell and a word a row. Beyond the window's sides lie rows of nothing.
 class Window {
@@ -304,7 +303,7 @@ private:
     bool follow(Changes&& changes, Take&& take) {
         uint64_t any = 1;
         reached_ = 0;
-        for (uint32_t k = 1; k <= uint32_t(kReach) && any != 0; ++k) {
+        for (uint32_t k = 1; k <= uint32_t(kJumpReach) && any != 0; ++k) {
             const Rows rows = rows_of(int(k));
             dilate(rows);
             any = 0;
@@ -376,7 +375,7 @@ void change(CellMap& cells, std::span<const ivec3> of, int few, Change&& in_wind
         Window window(cells, all, reach, words);
         if (in_window(window)) return;
     }
-    update_jumps(cells, grown(all, kReach, cells.size()));
+    update_jumps(cells, grown(all, kJumpReach, cells.size()));
 }
 
 }  // namespace

@@ -24,6 +24,9 @@ CellBox joined(const CellBox& a, const CellBox& b);
 
 /// Cell words by position, counted from the grid's first cell. Cells that were never written are empty, outside, and far from bricks.
 /// A map that wraps (its sides are powers of two, kCellPage at least) is a torus: any position is one of its cells.
+/// From further away, in cells, a cell changes no jump.
+constexpr int kJumpReach = kMaxJump - 1;
+
 class CellMap {
 public:
     using Words = PagedArray<uint32_t, kCellPage * kCellPage * kCellPage>;

@@ -21,7 +21,7 @@ namespace {
 
 // A region goes this far into the air around its part, where that is nearer to it than to the rest: what is left of the field then says no
 // less than half of it near where the part was, more than the distance at which bodies take themselves to touch.
-constexpr float kReach = 0.12f;                  // metres
+constexpr float kReachInMetres = 0.12f;          // metres
 constexpr int kLeastReach = 4, kMostReach = 16;  // points
 constexpr ivec3 kNeighbours[6] = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
 
@@ -342,7 +342,7 @@ std::vector<LoosePart> loose_parts(const SdfField& before, const SdfField& after
             high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
         }
         // Its points and the air around it, as far as that is nearer to it than to the rest.
-        const int reach = std::clamp(int(std::ceil(kReach / h)), kLeastReach, kMostReach), pad = reach + 2;
+        const int reach = std::clamp(int(std::ceil(kReachInMetres / h)), kLeastReach, kMostReach), pad = reach + 2;
         const ivec3 from = low - ivec3{pad, pad, pad};
         const ivec3 n = high - low + ivec3{2 * pad + 1, 2 * pad + 1, 2 * pad + 1};
         const size_t total = size_t(n.x) * size_t(n.y) * size_t(n.z);

@@ -15,7 +15,7 @@ constexpr Slice kInnerColumns = 0x7e7e7e7e7e7e7e7eu;
 constexpr Slice kLastRow = kRow << 56;
 constexpr Slice kLastColumn = kColumn << 7;
 
-constexpr int kRowGrain = 4;
+constexpr int kCountGrain = 4;
 
 }  // namespace
 
@@ -24,7 +24,7 @@ MeshEdges::MeshEdges(const MeshBricks& bricks) : bricks_(bricks) { edges_.resize
 void MeshEdges::count(int workers, Count items) {
     const std::span<const MeshBricks::Row> rows = bricks_.rows();
     parallel_for(
-        rows.size(), workers, [&](int i) { count_row(rows[size_t(i)], items); }, kRowGrain);
+        rows.size(), workers, [&](int i) { count_row(rows[size_t(i)], items); }, kCountGrain);
     for (size_t i = 0; i < edges_.size(); ++i) {
         edges_[i].first_edge = edge_count_;
         edges_[i].first_item = item_count_;

@@ -18,7 +18,7 @@
 namespace kiln::field {
 namespace {
 
-constexpr int kRowGrain = 2;
+constexpr int kSharpRowGrain = 2;
 
 float4 all_of(float v) { return float4{v, v, v, v}; }
 
@@ -459,7 +459,7 @@ void mesh_sharp(const MeshBricks& bricks, const ExactBrick& exact, Mesh& out, in
                 const MeshBricks::Row& row = bricks.rows()[size_t(i)];
                 for (size_t brick = row.first; brick < row.end; ++brick) fn(size_t(i), brick, scratch);
             },
-            kRowGrain);
+            kSharpRowGrain);
     };
     each_row([&](size_t, size_t brick, Scratch& scratch) { sharp.cross(brick, scratch); });
     std::vector<std::vector<FacePath>> found(bricks.rows().size());

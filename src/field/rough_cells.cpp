@@ -13,8 +13,7 @@
 namespace kiln::field {
 namespace {
 
-constexpr int kReach = kMaxJump - 1;  // from further away a cell changes no jump
-constexpr int kWords = 2;             // of a row's bits: kMostLevelCells is 128
+constexpr int kWords = 2;  // of a row's bits: kMostLevelCells is 128
 using Row = std::array<uint64_t, kWords>;
 using Ints __attribute__((vector_size(32))) = int32_t;
 
@@ -150,7 +149,7 @@ void settle_marks(CellMap& cells, const CellBox& box, const CellBox& window, boo
 
 void come_near(CellMap& cells, const CellBox& box, bool missing) {
     // What is beyond the box by so much or less; no further than round the torus to its other side.
-    const auto by = [&](int low, int high) { return std::min(kReach, std::max(cells.size().x - (high - low), 0)); };
+    const auto by = [&](int low, int high) { return std::min(kJumpReach, std::max(cells.size().x - (high - low), 0)); };
     const ivec3 more{by(box.min.x, box.max.x), by(box.min.y, box.max.y), by(box.min.z, box.max.z)};
     const auto past = [](int at, int first, int last) { return std::max({first - at, at - (last - 1), 0}); };
     const auto lower = [&](const Eight& had, Eight& changes, const CellBox& part, int y, int z) {
@@ -181,9 +180,9 @@ void come_near(CellMap& cells, const CellBox& box, bool missing) {
 void RoughCells::add(const CellBox& box) {
     if (box.empty()) return;
     const int side = int(layers_.size()) * kCellPage;
-    const uint32_t x = pages_of(box.min.x - kReach, box.max.x + kReach, side);
-    const uint32_t y = pages_of(box.min.y - kReach, box.max.y + kReach, side);
-    each_run(pages_of(box.min.z - kReach, box.max.z + kReach, side), [&](int first, int last) {
+    const uint32_t x = pages_of(box.min.x - kJumpReach, box.max.x + kJumpReach, side);
+    const uint32_t y = pages_of(box.min.y - kJumpReach, box.max.y + kJumpReach, side);
+    each_run(pages_of(box.min.z - kJumpReach, box.max.z + kJumpReach, side), [&](int first, int last) {
         for (int z = first; z < last; ++z) {
             Layer& layer = layers_[size_t(z)];
             count_ += layer.y_pages == 0;

@@ -24,7 +24,7 @@ namespace {
 // more is no picture, and must not take the memory of one.
 constexpr double kMostPixelsAByte = 1024;
 
-struct Call {
+struct JpegCall {
     jpeg_decompress_struct jpeg{};
     jpeg_error_mgr errors{};
     std::jmp_buf away;
@@ -34,7 +34,7 @@ struct Call {
     std::vector<uint8_t> raw;
 };
 
-Call& call_of(j_common_ptr jpeg) { return *static_cast<Call*>(jpeg->client_data); }
+JpegCall& call_of(j_common_ptr jpeg) { return *static_cast<JpegCall*>(jpeg->client_data); }
 
 [[noreturn]] void on_error(j_common_ptr jpeg) {
     std::array<char, JMSG_LENGTH_MAX> text{};
@@ -50,7 +50,7 @@ void on_message(j_common_ptr jpeg, int level) {
         call_of(jpeg).cut_short = true;
 }
 
-bool decode(Call* call) {
+bool decode(JpegCall* call) {
     if (setjmp(call->away)) return false;
     jpeg_decompress_struct* const jpeg = &call->jpeg;
     jpeg_create_decompress(jpeg);
@@ -91,7 +91,7 @@ bool is_jpeg(std::span<const std::byte> bytes) {
 
 Result<Pixels> decode_jpeg(std::span<const std::byte> bytes, const std::string& name) {
     if (!is_jpeg(bytes)) return Error{formatted("{}: not a JPEG file", name), ErrorKind::Input};
-    Call call;
+    JpegCall call;
     call.input = bytes;
     call.jpeg.err = jpeg_std_error(&call.errors);
     call.jpeg.client_data = &call;

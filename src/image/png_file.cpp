@@ -17,7 +17,7 @@
 namespace kiln::image {
 namespace {
 
-struct Call {
+struct PngCall {
     std::string fault;
     // reading
     std::span<const std::byte> input;
@@ -30,26 +30,26 @@ struct Call {
 };
 
 [[noreturn]] void on_error(png_structp png, png_const_charp message) {
-    static_cast<Call*>(png_get_error_ptr(png))->fault = message;
+    static_cast<PngCall*>(png_get_error_ptr(png))->fault = message;
     longjmp(*png_set_longjmp_fn(png, longjmp, sizeof(jmp_buf)), 1);
 }
 void on_warning(png_structp, png_const_charp) {}
 
 void take(png_structp png, png_bytep out, size_t count) {
-    Call& call = *static_cast<Call*>(png_get_io_ptr(png));
+    PngCall& call = *static_cast<PngCall*>(png_get_io_ptr(png));
     if (count > call.input.size() - call.at) png_error(png, "the file is cut short");
     std::memcpy(out, call.input.data() + call.at, count);
     call.at += count;
 }
 
 void put(png_structp png, png_bytep bytes, size_t count) {
-    Call& call = *static_cast<Call*>(png_get_io_ptr(png));
+    PngCall& call = *static_cast<PngCall*>(png_get_io_ptr(png));
     const std::byte* first = reinterpret_cast<const std::byte*>(bytes);
     call.output.insert(call.output.end(), first, first + count);
 }
 void flush(png_structp) {}
 
-bool decode(png_structp png, png_infop info, Call* call) {
+bool decode(png_structp png, png_infop info, PngCall* call) {
     if (setjmp(*png_set_longjmp_fn(png, longjmp, sizeof(jmp_buf)))) return false;
     png_set_user_limits(png, kMaxSide, kMaxSide);
     png_set_chunk_malloc_max(png, 8u << 20);
@@ -74,7 +74,7 @@ bool decode(png_structp png, png_infop info, Call* call) {
     return true;
 }
 
-bool encode(png_structp png, png_infop info, Call* call) {
+bool encode(png_structp png, png_infop info, PngCall* call) {
     if (setjmp(*png_set_longjmp_fn(png, longjmp, sizeof(jmp_buf)))) return false;
     const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_GRAY_ALPHA, PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA};
     png_set_write_fn(png, call, put, flush);
@@ -89,7 +89,7 @@ bool encode(png_structp png, png_infop info, Call* call) {
     return true;
 }
 
-Result<void> write(const std::string& path, Call& call) {
+Result<void> write(const std::string& path, PngCall& call) {
     KILN_ASSERT(call.width > 0 && call.height > 0 && call.width <= kMaxSide && call.height <= kMaxSide, "{} x {}",
                 call.width, call.height);
     const size_t row_bytes = call.raw.size() / size_t(call.height);
@@ -114,7 +114,7 @@ Result<Pixels> decode_png(std::span<const std::byte> bytes, const std::string& n
     if (bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(bytes.data()), 0, 8) != 0) {
         return Error{formatted("{}: not a PNG file", name), ErrorKind::Input};
     }
-    Call call;
+    PngCall call;
     call.input = bytes;
     png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &call, on_error, on_warning);
     png_infop info = png ? png_create_info_struct(png) : nullptr;
@@ -139,7 +139,7 @@ Result<Pixels> read_png(const std::string& path) {
 }
 
 Result<void> write_png(const std::string& path, const Pixels& pixels) {
-    Call call;
+    PngCall call;
     call.width = pixels.width, call.height = pixels.height, call.channels = pixels.channels, call.bits = pixels.bits;
     const size_t bytes_each = pixels.bits == 16 ? 2 : 1;
     call.raw.resize(pixels.values.size() * bytes_each);
@@ -152,7 +152,7 @@ Result<void> write_png(const std::string& path, const Pixels& pixels) {
 
 Result<void> write_png(const std::string& path, int width, int height, std::span<const uint8_t> rgba) {
     KILN_ASSERT(rgba.size() == size_t(width) * size_t(height) * 4, "{} bytes for {} x {}", rgba.size(), width, height);
-    Call call;
+    PngCall call;
     call.width = width, call.height = height, call.channels = 4, call.bits = 8;
     call.raw.assign(rgba.begin(), rgba.end());
     return write(path, call);

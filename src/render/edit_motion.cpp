@@ -9,9 +9,9 @@ namespace kiln::render {
 
 namespace {
 
-using Matrix = std::array<std::array<double, 3>, 3>;
+using Turn = std::array<std::array<double, 3>, 3>;
 
-Matrix rotation(quat q) {
+Turn rotation(quat q) {
     const double size = std::sqrt(double(q.x) * q.x + double(q.y) * q.y + double(q.z) * q.z + double(q.w) * q.w);
     const double x = q.x / size, y = q.y / size, z = q.z / size, w = q.w / size;
     return {{{1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)},
@@ -21,7 +21,7 @@ Matrix rotation(quat q) {
 
 // before · now⁻¹, both counted from the eye: in double precision, since the eye may be kilometres from the origin.
 MovedRecord record_of(const EditMotion& m, const double (&eye)[3]) {
-    const Matrix then = rotation(m.before.rotation), now = rotation(m.now.rotation);
+    const Turn then = rotation(m.before.rotation), now = rotation(m.now.rotation);
     const double ratio[3] = {double(m.before.scale.x) / double(m.now.scale.x),
                              double(m.before.scale.y) / double(m.now.scale.y),
                              double(m.before.scale.z) / double(m.now.scale.z)};

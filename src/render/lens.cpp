@@ -17,11 +17,11 @@ using namespace kiln::gpu;
 
 constexpr float kFinerShare = 0.75f;  // light of an octave, of the next coarser one's
 
-struct Light {
+struct Texels {
     int width = 0, height = 0;
     std::vector<vec3> texels;
 
-    Light(int w, int h) : width(w), height(h), texels(size_t(w) * size_t(h)) {}
+    Texels(int w, int h) : width(w), height(h), texels(size_t(w) * size_t(h)) {}
     const vec3& at(int x, int y) const {
         return texels[size_t(std::clamp(y, 0, height - 1)) * size_t(width) + size_t(std::clamp(x, 0, width - 1))];
     }
@@ -29,7 +29,7 @@ struct Light {
 
 // The texts of lib/bloom.gpu.h over an image.
 struct Filter {
-    const Light& from;
+    const Texels& from;
 
     vec3 bloom_sample(vec2 at) const {
         const float x = at.x - 0.5f, y = at.y - 0.5f, x_0 = std::floor(x), y_0 = std::floor(y);
@@ -41,7 +41,7 @@ struct Filter {
 };
 
 template <typename Texel>
-void fill(Light& out, int workers, Texel&& texel) {
+void fill(Texels& out, int workers, Texel&& texel) {
     parallel_for(out.height, workers, [&](int y) {
         for (int x = 0; x < out.width; ++x) out.texels[size_t(y) * size_t(out.width) + size_t(x)] = texel(x, y);
     });
@@ -51,30 +51,30 @@ void fill(Light& out, int workers, Texel&& texel) {
 vec2 middle(int x, int y, float finer) { return {(float(x) + 0.5f) * finer, (float(y) + 0.5f) * finer}; }
 
 // The glow at full size.
-Light pyramid(const Light& picture, float size, int workers) {
-    std::vector<Light> levels;
+Texels pyramid(const Texels& picture, float size, int workers) {
+    std::vector<Texels> levels;
     const std::vector<BloomLevel> plan = bloom_levels(picture.width, picture.height, size);
     for (const BloomLevel& level : plan) {
-        Light out(level.width, level.height);
-        const Light& from = levels.empty() ? picture : levels.back();
+        Texels out(level.width, level.height);
+        const Texels& from = levels.empty() ? picture : levels.back();
         Filter filter{from};
         fill(out, workers, [&](int x, int y) { return filter.bloom_down(middle(x, y, 2)); });
         levels.push_back(std::move(out));
     }
     for (size_t i = levels.size() - 1; i-- > 0;) {
         Filter filter{levels[i + 1]};
-        const Light here = levels[i];
+        const Texels here = levels[i];
         fill(levels[i], workers,
              [&](int x, int y) { return mix(here.at(x, y), filter.bloom_up(middle(x, y, 0.5f)), plan[i].coarser); });
     }
-    Light out(picture.width, picture.height);
+    Texels out(picture.width, picture.height);
     Filter filter{levels.front()};
     fill(out, workers, [&](int x, int y) { return filter.bloom_up(middle(x, y, 0.5f)); });
     return out;
 }
 
-Light blurred(const Light& picture, float multiplier, float threshold, int workers) {
-    Light now = picture;
+Texels blurred(const Texels& picture, float multiplier, float threshold, int workers) {
+    Texels now = picture;
     for (vec3& c : now.texels)
         if (!(shade::luminance(c) * multiplier >= threshold)) c = {};
     std::array<float, 2 * kBlurReach + 1> weights;
@@ -82,7 +82,7 @@ Light blurred(const Light& picture, float multiplier, float threshold, int worke
     for (int i = -kBlurReach; i <= kBlurReach; ++i)
         sum += weights[size_t(i + kBlurReach)] = std::exp(-0.125f * float(i * i));
     for (int pass = 0; pass < kBlurPasses; ++pass) {
-        Light next(now.width, now.height);
+        Texels next(now.width, now.height);
         fill(next, workers, [&](int x, int y) {
             vec3 c{};
             for (int i = -kBlurReach; i <= kBlurReach; ++i)
@@ -134,7 +134,7 @@ shade::ExposureState measured_exposure(std::span<const float> rgba, const Camera
 }
 
 std::vector<vec3> glow_of(const Picture& picture, const Camera& camera, float multiplier, int workers) {
-    Light light(picture.width, picture.height);
+    Texels light(picture.width, picture.height);
     fill(light, workers, [&](int x, int y) {
         const float* const p = picture.rgba.data() + (size_t(y) * size_t(picture.width) + size_t(x)) * 4;
         return vec3{p[0], p[1], p[2]};

@@ -23,7 +23,6 @@ dvec3 unit_or(dvec3 v, dvec3 other) {
     const double size = std::sqrt(dotted(v, v));
     return size > 0 ? dvec3{v.x / size, v.y / size, v.z / size} : other;
 }
-dvec3 wide(vec3 v) { return {v.x, v.y, v.z}; }
 
 // Inverse transpose of a map, given its inverse.
 dvec3 normal_by(const Matrix& back, dvec3 n) {

@@ -26,9 +26,7 @@ using shade::SurfaceView;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-dvec3 wide(vec3 v) { return {v.x, v.y, v.z}; }
 vec3 narrow(dvec3 v) { return {float(v.x), float(v.y), float(v.z)}; }
-dvec3 along(dvec3 o, dvec3 d, double t) { return {o.x + d.x * t, o.y + d.y * t, o.z + d.z * t}; }
 double size_of(dvec3 v) { return std::sqrt(v.x * v.x + v.y * v.y + v.z * v.z); }
 
 // PCG (O'Neill, 2014) with the 32-bit output of the shaders' hash; a sequence of its own for each pixel and sample.

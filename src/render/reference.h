@@ -68,6 +68,8 @@ struct ReferencePicture {
 ReferencePicture render_reference(const ReferenceField& field, std::span<const Light> lights,
                                   const shade::SkyParams& sky, const Camera& camera, const ReferenceSettings& settings);
 
+inline dvec3 along(dvec3 o, dvec3 d, double t) { return {o.x + d.x * t, o.y + d.y * t, o.z + d.z * t}; }
+
 // First point of the ray where the distance is <= 0, by sphere tracing, then bisection to 1e-12 of t; a negative number if there
 // is none before t_last. `direction` is unit. A ray that starts inside answers 0.
 double reference_hit(const ReferenceField& field, dvec3 origin, dvec3 direction, double t_last);

@@ -9,8 +9,6 @@
 namespace kiln::render {
 namespace {
 
-dvec3 along(dvec3 o, dvec3 d, double t) { return {o.x + d.x * t, o.y + d.y * t, o.z + d.z * t}; }
-
 dvec3 normal_of(const ReferenceField& field, dvec3 p) {
     const double h = 1e-5 * std::max(1.0, std::fabs(p.x) + std::fabs(p.y) + std::fabs(p.z));
     const dvec3 g{field.distance({p.x + h, p.y, p.z}) - field.distance({p.x - h, p.y, p.z}),

@@ -14,7 +14,6 @@ double dotted(dvec3 a, dvec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 dvec3 crossed(dvec3 a, dvec3 b) { return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x}; }
 dvec3 scaled(dvec3 a, double by) { return {a.x * by, a.y * by, a.z * by}; }
 dvec3 unit(dvec3 a) { return scaled(a, 1 / std::sqrt(dotted(a, a))); }
-dvec3 wide(vec3 a) { return {a.x, a.y, a.z}; }
 
 // Steps of a fourth of an octave: what moves a little keeps its maps.
 double stepped_up(double x) { return std::exp2(std::ceil(4 * std::log2(x)) / 4); }

@@ -23,8 +23,6 @@ namespace kiln {
 
 namespace {
 
-/// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
-constexpr double kMaxCells = double(1u << 25);
 constexpr int kMostDoublings = 24;
 // Three quarters of what the renderer's atlas holds; the rest is for what moves.
 constexpr uint32_t kMostBricks = 3u << 16;

@@ -230,6 +230,9 @@ struct World::Impl {
     std::optional<Baked> baked(const FieldSettings& settings);
 };
 
+/// Most cells of a field's grid: their words fill the largest buffer that every device can bind (128 MiB).
+constexpr double kMaxCells = double(1u << 25);
+
 inline float longest_side(const Box3& box) {
     const vec3 size = box.max - box.min;
     return std::max({size.x, size.y, size.z});

@@ -19,7 +19,6 @@ namespace kiln {
 
 namespace {
 
-constexpr double kMaxCells = double(1u << 25);  // of a grid: 128 MiB of cell words
 constexpr float kMargin = 3;  // voxels of grid around what is meshed, so that nothing is cut by the grid
 constexpr const char* kDefaultName = "default";
 

@@ -16,7 +16,7 @@ namespace kiln::sdf {
 
 namespace {
 
-constexpr uint32_t kNone = UINT32_MAX;
+constexpr uint32_t kNowhere = UINT32_MAX;
 constexpr uint32_t kNever = UINT32_MAX;
 constexpr uint32_t kMostRegisters = 32;
 
@@ -26,10 +26,10 @@ public:
         : nodes_(formula.nodes), most_(std::clamp(most_registers, kFewestFormulaRegisters, kMostRegisters)) {}
 
     FormulaCode run() {
-        register_.assign(nodes_.size(), kNone);
-        slot_.assign(nodes_.size(), kNone);
+        register_.assign(nodes_.size(), kNowhere);
+        slot_.assign(nodes_.size(), kNowhere);
         find_uses();
-        holds_.fill(kNone);
+        holds_.fill(kNowhere);
         const uint32_t value = uint32_t(nodes_.size() - 1);
         for (uint32_t i = 0; i <= value; ++i) {
             now_ = i;
@@ -38,7 +38,7 @@ public:
             if (count == 0) continue;  // numbers stand in instructions, coordinates are taken where they are wanted
             uint32_t flags = 0, number = 0;
             uint32_t in[2] = {0, 0};
-            pinned_ = {kNone, kNone};
+            pinned_ = {kNowhere, kNowhere};
             for (int k = 0; k < count; ++k) {
                 const uint32_t operand = k == 0 ? n.a : n.b;
                 if (nodes_[operand].fn == Fn::Constant) {
@@ -55,7 +55,7 @@ public:
             emit(n.fn, flags, dst, in[0], in[1], number);
         }
         now_ = value;
-        pinned_ = {kNone, kNone};
+        pinned_ = {kNowhere, kNowhere};
         if (nodes_[value].fn == Fn::Constant) {
             const uint32_t dst = take_register();
             emit(Fn::Constant, 0, dst, 0, 0, add_number(nodes_[value].constant));
@@ -101,19 +101,19 @@ private:
 
     uint32_t take_register() {
         for (uint32_t r = 0; r < most_; ++r)
-            if (holds_[r] == kNone) return r;
-        uint32_t victim = kNone;
+            if (holds_[r] == kNowhere) return r;
+        uint32_t victim = kNowhere;
         for (uint32_t r = 0; r < most_; ++r) {
             if (r == pinned_[0] || r == pinned_[1]) continue;
-            if (victim == kNone || next_use(holds_[r]) > next_use(holds_[victim])) victim = r;
+            if (victim == kNowhere || next_use(holds_[r]) > next_use(holds_[victim])) victim = r;
         }
         const uint32_t node = holds_[victim];
-        if (operands(nodes_[node].fn) > 0 && slot_[node] == kNone) {
+        if (operands(nodes_[node].fn) > 0 && slot_[node] == kNowhere) {
             slot_[node] = take_slot();
             emit(Fn::Store, 0, victim, victim, 0, add_number(float(slot_[node])));
         }
-        register_[node] = kNone;
-        holds_[victim] = kNone;
+        register_[node] = kNowhere;
+        holds_[victim] = kNowhere;
         return victim;
     }
     uint32_t take_slot() {
@@ -126,7 +126,7 @@ private:
     }
 
     uint32_t bring(uint32_t node) {
-        if (register_[node] != kNone) return register_[node];
+        if (register_[node] != kNowhere) return register_[node];
         const uint32_t reg = take_register();
         if (operands(nodes_[node].fn) == 0) {
             emit(nodes_[node].fn, 0, reg, 0, 0, 0);
@@ -141,10 +141,10 @@ private:
         if (nodes_[node].fn == Fn::Constant) return;
         while (next_use_[node] < first_use_[node + 1] && uses_[next_use_[node]] <= now_) ++next_use_[node];
         if (next_use(node) != kNever) return;
-        if (register_[node] != kNone) holds_[register_[node]] = kNone;
-        register_[node] = kNone;
-        if (slot_[node] != kNone) free_slots_.push_back(slot_[node]);
-        slot_[node] = kNone;
+        if (register_[node] != kNowhere) holds_[register_[node]] = kNowhere;
+        register_[node] = kNowhere;
+        if (slot_[node] != kNowhere) free_slots_.push_back(slot_[node]);
+        slot_[node] = kNowhere;
     }
 
     const std::vector<FormulaNode>& nodes_;

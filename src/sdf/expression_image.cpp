@@ -16,7 +16,7 @@ namespace kiln::sdf {
 namespace {
 
 constexpr uint32_t kInputs = 3;
-constexpr uint32_t kNone = UINT32_MAX;
+constexpr uint32_t kUnnamed = UINT32_MAX;
 constexpr int kSplit = 4;      // a tile becomes kSplit² = kTileLanes
 constexpr int kBlock = 8;      // pixels a side of a chunk of 64 points
 constexpr int kSmallest = 16;  // pixels a side of tiles that are not cut further
@@ -32,15 +32,15 @@ struct Code {
 class Dealer {
 public:
     void begin(size_t old_names) {
-        new_of_.assign(old_names, kNone);
+        new_of_.assign(old_names, kUnnamed);
         free_.clear();
         used_ = kInputs;
     }
-    bool alive(uint32_t old_name) const { return new_of_[old_name] != kNone; }
+    bool alive(uint32_t old_name) const { return new_of_[old_name] != kUnnamed; }
     uint32_t name(uint32_t old_name) {
         if (old_name < kInputs) return old_name;
         uint32_t& out = new_of_[old_name];
-        if (out == kNone) {
+        if (out == kUnnamed) {
             if (free_.empty()) {
                 out = used_++;
             } else {
@@ -53,7 +53,7 @@ public:
     // The value that was used from here on is made here.
     uint32_t made(uint32_t old_name) {
         const uint32_t out = new_of_[old_name];
-        new_of_[old_name] = kNone;
+        new_of_[old_name] = kUnnamed;
         return out;
     }
     void rename(uint32_t old_name, uint32_t as) { new_of_[old_name] = as; }

@@ -14,7 +14,6 @@ namespace {
 constexpr int kMostParts = 1600000;  // about a second; only surfaces that are everywhere equally near need so many
 constexpr int kPatience =
     3;  // halvings, which may bring a box into a smaller region; as many until code may have become shorter
-constexpr int kMostIdle = 3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 dvec3 operator+(dvec3 a, dvec3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
@@ -22,7 +21,6 @@ dvec3 operator-(dvec3 a, dvec3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 dvec3 operator*(dvec3 a, double s) { return {a.x * s, a.y * s, a.z * s}; }
 double dot(dvec3 a, dvec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 double length(dvec3 a) { return std::sqrt(dot(a, a)); }
-double largest(dvec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 // A box that may hold the nearest point, and its code: a region's, or a piece of the search's own.
 struct Part {

@@ -11,12 +11,9 @@ namespace {
 
 constexpr size_t kShort = 24;  // instructions that are not worth halving
 constexpr int kMostDepth = 28;
-constexpr int kMostIdle = 3;            // generations without shrinking by a fifth
 constexpr size_t kMostKept = 8u << 20;  // instructions: 64 MiB
 constexpr double kRootScenes = 64;      // the root's side in sides of the scene
 constexpr double kHalfDiagonal = 1.7320509;
-
-double largest(dvec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 }  // namespace
 

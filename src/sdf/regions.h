@@ -7,12 +7,19 @@
 #include "sdf/eval.h"
 #include "sdf/program.h"
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <vector>
 
 namespace kiln::sdf {
+
+/// Generations in which pruning did not shorten code by a fifth, and it is not tried again.
+constexpr int kMostIdle = 3;
+
+inline double largest(dvec3 p) { return std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}); }
 
 class Regions {
 public:

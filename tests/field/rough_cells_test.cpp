@@ -11,12 +11,12 @@ namespace kiln::field {
 namespace {
 
 // A torus of words, and what each should say, found by looking at all neighbours again and again.
-struct Torus {
+struct TorusMap {
     int n;
     CellMap cells;
     ivec3 first{};  // of the window
 
-    explicit Torus(int side) : n(side), cells(CellMap::torus(side)) {}
+    explicit TorusMap(int side) : n(side), cells(CellMap::torus(side)) {}
     size_t at(int x, int y, int z) const {
         const int mask = n - 1;
         return size_t(((z & mask) * n + (y & mask)) * n + (x & mask));
@@ -88,7 +88,7 @@ class AnySide : public testing::TestWithParam<int> {};
 TEST_P(AnySide, WordsAreNeverWrongAndExactWhenSettled) {
     const int n = GetParam();
     worlds::Random r{uint32_t(n)};
-    Torus torus(n);
+    TorusMap torus(n);
     RoughCells rough(n);
     const auto missing_cells = [&] {
         int out = 0;

@@ -19,7 +19,7 @@ using namespace kiln::physics::worlds;
 
 namespace {
 
-constexpr float kCell = 0.1f;
+constexpr float kFine = 0.1f;
 
 // The regions' own triangles, welded by the bits of their corners: the eight about the corner where they meet, so that every border is
 // crossed.
@@ -34,7 +34,7 @@ Welded welded(const field::SdfField& exact, ivec3 low = {-1, -1, -1}, ivec3 high
     for (int z = low.z; z <= high.z; ++z)
         for (int y = low.y; y <= high.y; ++y)
             for (int x = low.x; x <= high.x; ++x) {
-                const auto mesh = mesh_region(exact, kCell, {x, y, z});
+                const auto mesh = mesh_region(exact, kFine, {x, y, z});
                 for (uint32_t i = 0; i < 3 * mesh->own(); ++i) {
                     const vec3 v = mesh->vertices[mesh->indices[i]];
                     std::array<uint32_t, 3> bits;
@@ -68,7 +68,7 @@ TEST(RegionMesh, RegionsFitTogetherBitForBit) {
 }
 
 TEST(RegionMesh, ABoxIsAnsweredWithTheTrianglesThatMeetItAndNoneTwice) {
-    const auto mesh = mesh_region(*field_of({edit(kiln::Sphere{.radius = 3}, {5, 5, 5})}), kCell, {0, 0, 0});
+    const auto mesh = mesh_region(*field_of({edit(kiln::Sphere{.radius = 3}, {5, 5, 5})}), kFine, {0, 0, 0});
     ASSERT_GT(mesh->own(), 1000u);
     std::mt19937 rng(2);
     for (int k = 0; k < 50; ++k) {
@@ -104,7 +104,7 @@ public:
         for (int i = 0; i < points.count; ++i) out[i] = value(points.x[i], points.y[i], points.z[i]);
     }
     Box3 bounds() const override {
-        const float side = float(reach_) * kCell;
+        const float side = float(reach_) * kFine;
         return {{-side, -side, -side}, {side, side, side}};
     }
 
@@ -112,12 +112,12 @@ private:
     float value(float x, float y, float z) const {
         uint32_t hash = 0;
         for (const float v : {x, y, z}) {
-            const int at = int(std::lround(v / kCell));
-            if (std::abs(at) >= reach_) return kCell;
+            const int at = int(std::lround(v / kFine));
+            if (std::abs(at) >= reach_) return kFine;
             hash = (hash ^ uint32_t(at + 1000)) * 2654435761u;
             hash ^= hash >> 15;
         }
-        return (float(hash & 0xffff) / 32768 - 1) * kCell;
+        return (float(hash & 0xffff) / 32768 - 1) * kFine;
     }
     int reach_;
 };
@@ -147,19 +147,19 @@ struct Farthest {
 template <typename Distance>
 Farthest farthest(const Welded& mesh, Distance&& distance) {
     Farthest out;
-    for (const vec3 v : mesh.vertices) out.vertex = std::max(out.vertex, std::abs(distance(v)) / kCell);
+    for (const vec3 v : mesh.vertices) out.vertex = std::max(out.vertex, std::abs(distance(v)) / kFine);
     for (size_t i = 0; i < mesh.indices.size(); i += 3) {
         const vec3 middle =
             (mesh.vertices[mesh.indices[i]] + mesh.vertices[mesh.indices[i + 1]] + mesh.vertices[mesh.indices[i + 2]]) /
             3;
-        out.middle = std::max(out.middle, std::abs(distance(middle)) / kCell);
+        out.middle = std::max(out.middle, std::abs(distance(middle)) / kFine);
     }
     return out;
 }
 
 TEST(RegionMesh, ABallsVerticesAndMiddlesOfTrianglesLieOnItsSurface) {
     for (const float radius_voxels : {8.0f, 20.0f, 100.0f}) {
-        const float r = radius_voxels * kCell;
+        const float r = radius_voxels * kFine;
         const vec3 center{0.031f, -0.023f, 0.017f};
         const Welded mesh = welded(*field_of({edit(kiln::Sphere{.radius = r}, center)}));
         const auto [vertex, middle] = farthest(mesh, [&](vec3 p) { return length(p - center) - r; });
@@ -170,7 +170,7 @@ TEST(RegionMesh, ABallsVerticesAndMiddlesOfTrianglesLieOnItsSurface) {
 }
 
 TEST(RegionMesh, ATorusHasAHoleAndLiesOnItsSurface) {
-    const float minor = 8 * kCell, major = 40 * kCell;
+    const float minor = 8 * kFine, major = 40 * kFine;
     Edit e = edit(kiln::Torus{.major_radius = major, .minor_radius = minor}, {0.031f, -0.023f, 0.017f});
     e.node.transform.rotation = axis_angle(normalize(vec3{1, 2, 3}), 0.7f);
     const Welded mesh = welded(*field_of({e}));

@@ -20,7 +20,7 @@ namespace {
 
 using testing::HasSubstr;
 
-constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.1},
+constexpr const char* kThinPillar = R"({"format": 1, "field": {"voxel_size": 0.1},
   "edits": [{"id": "ground", "shape": "plane"},
             {"id": "pillar", "shape": "box", "half_extents": [0.1, 1, 0.1], "position": [0, 1, 0]},
             {"id": "block", "shape": "box", "half_extents": [0.5, 0.3, 0.5], "position": [0, 2.2, 0]}],
@@ -43,7 +43,7 @@ struct Outcome {
 class View : public testing::Test {
 protected:
     View() {
-        write("pillar.kiln.json", kPillar);
+        write("pillar.kiln.json", kThinPillar);
         write("dig.jsonl", kDig);
     }
     std::string read(const std::string& name) const {

@@ -20,12 +20,6 @@ Plan must_compile(const Graph& g, const CompileOptions& options = {}) {
     return plan ? std::move(*plan) : Plan{};
 }
 
-std::string joined(const std::vector<std::string>& lines) {
-    std::string out;
-    for (const std::string& l : lines) out += l + "\n";
-    return out;
-}
-
 void expect_golden(const std::string& name, const std::string& text) {
     const std::string path = std::string(KILN_SOURCE_DIR) + "/tests/golden/plans/" + name;
     std::stringstream golden;

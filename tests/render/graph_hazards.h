@@ -5,11 +5,21 @@
 
 #include "render/graph_plan.h"
 
+#include <span>
+#include <string>
+#include <vector>
+
 namespace kiln::render::samples {
 
 // Sentences about what is wrong with frames executed one after the other on one device: hazards, wrong layouts, contents
 // read that were lost, wrong states left, transients overlapping in memory and time.
 std::vector<std::string> find_hazards(std::span<const Plan> frames);
+
+inline std::string joined(const std::vector<std::string>& lines) {
+    std::string out;
+    for (const std::string& l : lines) out += l + "\n";
+    return out;
+}
 
 // What is wrong with the choice of passes: a culled one whose result is seen, a kept one that nobody needs, a wrong order.
 std::vector<std::string> find_cull_faults(const Graph& graph, const Plan& plan);

@@ -39,12 +39,6 @@ void drop_world(rhi::Device& device, World& world) {
     for (const rhi::BufferHandle b : world.buffers) device.destroy(b);
 }
 
-std::string joined(const std::vector<std::string>& lines) {
-    std::string out;
-    for (const std::string& l : lines) out += l + "\n";
-    return out;
-}
-
 // Frames of random graphs, every one on what the last one left. All bytes that were read back.
 std::vector<std::vector<std::byte>> run_random(rhi::Device& device, uint32_t seed, const RunnerOptions& runner_options,
                                                const FuzzOptions& options, int frames) {

@@ -9,7 +9,7 @@
 namespace kiln::render {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 72;
+constexpr int kLinesWidth = 96, kLinesHeight = 72;
 
 struct LinesGpu : testing::Test {
     void SetUp() override {
@@ -28,7 +28,7 @@ struct LinesGpu : testing::Test {
     }
     // What lines cover of each pixel, as linear light.
     std::vector<float> drawn() {
-        const Picture p = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        const Picture p = rhi::must(renderer->render(frame, {.width = kLinesWidth, .height = kLinesHeight}));
         std::vector<float> out;
         for (size_t i = 0; i < p.srgb.size(); i += 4) out.push_back(shade::linear_from_srgb(float(p.srgb[i]) / 255));
         return out;
@@ -38,13 +38,13 @@ struct LinesGpu : testing::Test {
     };
     // In pixels; the point is before the eye.
     Point seen(dvec3 p) const {
-        const shade::CameraParams c = shade::camera_params(frame.camera, kWidth, kHeight);
+        const shade::CameraParams c = shade::camera_params(frame.camera, kLinesWidth, kLinesHeight);
         const double d[3] = {p.x - double(c.eye.x), p.y - double(c.eye.y), p.z - double(c.eye.z)};
         const auto along = [&](const vec4& v) {
             return (d[0] * v.x + d[1] * v.y + d[2] * v.z) / (double(v.x) * v.x + double(v.y) * v.y + double(v.z) * v.z);
         };
         const double ahead = along(c.forward);
-        return {(along(c.right) / ahead + 1) * kWidth / 2, (1 - along(c.up) / ahead) * kHeight / 2};
+        return {(along(c.right) / ahead + 1) * kLinesWidth / 2, (1 - along(c.up) / ahead) * kLinesHeight / 2};
     }
     static double share(Point pixel, Point a, Point b, double width) {
         const double x = b.x - a.x, y = b.y - a.y, square = x * x + y * y;
@@ -57,11 +57,11 @@ struct LinesGpu : testing::Test {
         frame.lines = {line};
         const std::vector<float> got = drawn();
         double sum = 0;
-        for (int y = 0; y < kHeight; ++y) {
-            for (int x = 0; x < kWidth; ++x) {
+        for (int y = 0; y < kLinesHeight; ++y) {
+            for (int x = 0; x < kLinesWidth; ++x) {
                 const double wanted = share({x + 0.5, y + 0.5}, a, b, double(line.width_px));
                 // Eight bits of sRGB.
-                EXPECT_NEAR(double(got[size_t(y * kWidth + x)]), wanted, 0.008) << x << ", " << y;
+                EXPECT_NEAR(double(got[size_t(y * kLinesWidth + x)]), wanted, 0.008) << x << ", " << y;
                 sum += wanted;
             }
         }
@@ -84,7 +84,7 @@ TEST_F(LinesGpu, ThatBeginBehindTheEyeOrFarOutsideAreDrawnWhereTheyAreSeen) {
     // From behind the eye: towards the side that it comes from, as far as one can see.
     const DebugLine behind{.a = {4, 3, 9}, .b = {0.9, 0.8, 0}, .width_px = 2};
     dvec3 at = behind.b;
-    const vec4 forward = shade::camera_params(frame.camera, kWidth, kHeight).forward;
+    const vec4 forward = shade::camera_params(frame.camera, kLinesWidth, kLinesHeight).forward;
     const auto ahead = [&](dvec3 p) {
         return (p.x - double(frame.camera.position.x)) * double(forward.x) +
                (p.y - double(frame.camera.position.y)) * double(forward.y) +
@@ -102,7 +102,7 @@ TEST_F(LinesGpu, ThatBeginBehindTheEyeOrFarOutsideAreDrawnWhereTheyAreSeen) {
 
 TEST_F(LinesGpu, BehindThingsShowTheShareTheyAskFor) {
     frame.camera.position = {0, 0, 4};
-    const size_t middle = size_t(kHeight / 2 * kWidth + kWidth / 2), beside = middle + 25;
+    const size_t middle = size_t(kLinesHeight / 2 * kLinesWidth + kLinesWidth / 2), beside = middle + 25;
     const auto at = [&](double z, float hidden) {
         frame.lines = {{.a = {-3, 0, z}, .b = {3, 0, z}, .width_px = 4, .hidden = hidden}};
         return drawn();

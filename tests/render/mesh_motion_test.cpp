@@ -12,7 +12,7 @@
 namespace kiln::render {
 namespace {
 
-constexpr int kWidth = 64, kHeight = 48;
+constexpr int kMotionWidth = 64, kMotionHeight = 48;
 
 struct MeshMotionGpu : GpuTest {};
 
@@ -34,7 +34,8 @@ TEST_F(MeshMotionGpu, IsThatOfItsTransformAndOfTheCamera) {
     GpuField gpu(*runner_);
     GpuMeshes meshes(*runner_);
     rhi::must(gpu.update(frame.field, Baker::Host));
-    const FrameParams p = rhi::must(frame_params(frame, {.width = kWidth, .height = kHeight, .refine = false}, gpu));
+    const FrameParams p =
+        rhi::must(frame_params(frame, {.width = kMotionWidth, .height = kMotionHeight, .refine = false}, gpu));
     rhi::must(meshes.update(frame, p.camera));
     Graph g(*runner_);
     TileInputs in;
@@ -44,24 +45,24 @@ TEST_F(MeshMotionGpu, IsThatOfItsTransformAndOfTheCamera) {
     in.frame = g.block(p);
     const FrameRay no_ray{};
     in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
-    in.size = {kWidth, kHeight};
-    in.motion = g.block(motion_params(frame.camera, before, kWidth, kHeight));
+    in.size = {kMotionWidth, kMotionHeight};
+    in.motion = g.block(motion_params(frame.camera, before, kMotionWidth, kMotionHeight));
     const Visibility field = march(g, in);
     const Image seen = see_meshes(g, in, draw_clusters(g, in).ids, field.words, field.words);
     const Readback moved = g.readback(motion(g, in, seen)), words = g.readback(seen);
     rhi::must(runner_->execute(g));
     const auto halves = rhi::must(moved.get_as<uint16_t>());
     const auto visible = rhi::must(words.get_as<uint32_t>());
-    const shade::CameraParams now = shade::camera_params(frame.camera, kWidth, kHeight),
-                              then = shade::camera_params(before, kWidth, kHeight);
+    const shade::CameraParams now = shade::camera_params(frame.camera, kMotionWidth, kMotionHeight),
+                              then = shade::camera_params(before, kMotionWidth, kMotionHeight);
     const Transform& t = mesh.transform;
     const quat back{-t.rotation.x, -t.rotation.y, -t.rotation.z, t.rotation.w};
     int judged = 0;
     float largest = 0;
-    for (size_t i = 0; i < size_t{kWidth} * kHeight; ++i) {
+    for (size_t i = 0; i < size_t{kMotionWidth} * kMotionHeight; ++i) {
         if (visible[4 * i + 1] >> 28 != kSeenMesh) continue;
         ++judged;
-        const vec3 d = shade::camera_direction_at(now, float(i % kWidth) + 0.5f, float(i / kWidth) + 0.5f);
+        const vec3 d = shade::camera_direction_at(now, float(i % kMotionWidth) + 0.5f, float(i / kMotionWidth) + 0.5f);
         const vec3 at = frame.camera.position + d * (std::bit_cast<float>(visible[4 * i]) * p.grid.voxel_size);
         const vec3 local = rotate(back, at - t.position) * vec3{1 / t.scale.x, 1 / t.scale.y, 1 / t.scale.z};
         const vec3 was = placed(mesh.before, local);

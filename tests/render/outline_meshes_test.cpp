@@ -9,7 +9,7 @@
 namespace kiln::render {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 72;
+constexpr int kMeshesWidth = 96, kMeshesHeight = 72;
 
 struct OutlineMeshesGpu : testing::Test {
     void SetUp() override {
@@ -26,8 +26,8 @@ struct OutlineMeshesGpu : testing::Test {
     }
     // Red of each pixel.
     std::vector<float> drawn(bool hulls) {
-        const Picture p =
-            rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .outline_hulls = hulls}));
+        const Picture p = rhi::must(
+            renderer->render(frame, {.width = kMeshesWidth, .height = kMeshesHeight, .outline_hulls = hulls}));
         std::vector<float> out;
         for (size_t i = 0; i < p.srgb.size(); i += 4) out.push_back(shade::linear_from_srgb(float(p.srgb[i]) / 255));
         return out;
@@ -48,11 +48,11 @@ TEST_F(OutlineMeshesGpu, AreAsWideFromEveryDistanceAndNotBehindThings) {
         frame.meshes = {mesh};
         const std::vector<float> line = drawn(false);
         float left = 0, above = 0;
-        for (int x = 0; x < kWidth / 2; ++x) left += line[size_t(kHeight / 2 * kWidth + x)];
-        for (int y = 0; y < kHeight / 2; ++y) above += line[size_t(y * kWidth + kWidth / 2)];
+        for (int x = 0; x < kMeshesWidth / 2; ++x) left += line[size_t(kMeshesHeight / 2 * kMeshesWidth + x)];
+        for (int y = 0; y < kMeshesHeight / 2; ++y) above += line[size_t(y * kMeshesWidth + kMeshesWidth / 2)];
         EXPECT_NEAR(left, 5, 0.5f) << distance;
         EXPECT_NEAR(above, 5, 0.5f) << distance;
-        EXPECT_EQ(line[size_t(kHeight / 2 * kWidth + kWidth / 2)], 0.0f) << "inside";
+        EXPECT_EQ(line[size_t(kMeshesHeight / 2 * kMeshesWidth + kMeshesWidth / 2)], 0.0f) << "inside";
     }
     // The wall hides its right side: the line goes round what is left of it.
     frame.camera.position = {0, 0, 4};
@@ -62,12 +62,12 @@ TEST_F(OutlineMeshesGpu, AreAsWideFromEveryDistanceAndNotBehindThings) {
     const std::vector<float> line = drawn(false);
     float right = 0;
     int last = 0;
-    for (int x = kWidth / 2; x < kWidth; ++x) {
-        right += line[size_t(kHeight / 2 * kWidth + x)];
-        if (line[size_t(kHeight / 2 * kWidth + x)] > 0.5f) last = x;
+    for (int x = kMeshesWidth / 2; x < kMeshesWidth; ++x) {
+        right += line[size_t(kMeshesHeight / 2 * kMeshesWidth + x)];
+        if (line[size_t(kMeshesHeight / 2 * kMeshesWidth + x)] > 0.5f) last = x;
     }
     EXPECT_NEAR(right, 3, 0.5f);
-    EXPECT_LT(last, kWidth / 2 + 20) << "at the wall's edge";
+    EXPECT_LT(last, kMeshesWidth / 2 + 20) << "at the wall's edge";
 }
 
 TEST_F(OutlineMeshesGpu, OfHullsGrowThinWithDistanceAndAreDrawnOutsideAlone) {
@@ -83,7 +83,7 @@ TEST_F(OutlineMeshesGpu, OfHullsGrowThinWithDistanceAndAreDrawnOutsideAlone) {
         for (const float share : line) covered += share;
         EXPECT_GT(covered, 1) << distance;
         EXPECT_LT(covered, before) << distance;
-        EXPECT_EQ(line[size_t(kHeight / 2 * kWidth + kWidth / 2 - 8)], 0.0f) << "inside";
+        EXPECT_EQ(line[size_t(kMeshesHeight / 2 * kMeshesWidth + kMeshesWidth / 2 - 8)], 0.0f) << "inside";
         before = covered;
     }
 }

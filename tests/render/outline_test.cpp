@@ -13,10 +13,10 @@
 namespace kiln::render {
 namespace {
 
-constexpr int kWidth = 96, kHeight = 80;
+constexpr int kOutlineWidth = 96, kOutlineHeight = 80;
 
 struct OutlineGpu : GpuTest {
-    int width_ = kWidth, height_ = kHeight;  // of masks
+    int width_ = kOutlineWidth, height_ = kOutlineHeight;  // of masks
     // Lines round `owner` (number + 1 of a record, 0 outside) as shares of pixels, drawn in red on black.
     std::vector<uint32_t> flooded_seeds;
     std::vector<float> covered(const std::vector<uint32_t>& owner, const std::vector<float>& widths) {
@@ -140,7 +140,7 @@ TEST_F(OutlineGpu, AnEdgeAndADiscHaveLinesOfTheirWidth) {
     for (const float width : {1.0f, 2.5f, 7.0f}) {
         const std::vector<float> edge = covered(mask_of([](double x, double) { return x < 40 ? 1 : 0; }), {width});
         double row = 0;
-        for (int x = 0; x < kWidth; ++x) row += double(edge[size_t(20 * kWidth + x)]);
+        for (int x = 0; x < kOutlineWidth; ++x) row += double(edge[size_t(20 * kOutlineWidth + x)]);
         EXPECT_NEAR(row, width, 0.02);
         // Straight edges of other slopes, measured along them.
         for (const double degrees : {10.0, 26.0, 45.0, 61.0}) {
@@ -149,10 +149,10 @@ TEST_F(OutlineGpu, AnEdgeAndADiscHaveLinesOfTheirWidth) {
             double sum = 0;
             const std::vector<float> slope = covered(
                 mask_of([&](double x, double y) { return nx * (x - 48) + ny * (y - 40) < 0.1 ? 1 : 0; }), {width});
-            for (int y = 0; y < kHeight; ++y) {
-                for (int x = 0; x < kWidth; ++x) {
+            for (int y = 0; y < kOutlineHeight; ++y) {
+                for (int x = 0; x < kOutlineWidth; ++x) {
                     const double along = -ny * (x + 0.5 - 48) + nx * (y + 0.5 - 40);
-                    if (std::fabs(along) < 22) sum += double(slope[size_t(y * kWidth + x)]);
+                    if (std::fabs(along) < 22) sum += double(slope[size_t(y * kOutlineWidth + x)]);
                 }
             }
             EXPECT_NEAR(sum / 44, width, 0.2) << degrees << " degrees";
@@ -185,14 +185,14 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
         GpuField gpu(*runner_);
         rhi::must(gpu.update(frame.field, Baker::Host));
         const FrameParams p =
-            rhi::must(frame_params(frame, {.width = kWidth, .height = kHeight, .refine = false}, gpu));
+            rhi::must(frame_params(frame, {.width = kOutlineWidth, .height = kOutlineHeight, .refine = false}, gpu));
         Graph g(*runner_);
         TileInputs in;
         in.field = gpu.import(g);
         in.frame = g.block(p);
         const FrameRay no_ray{};
         in.rays = g.upload("rays", std::span<const FrameRay>(&no_ray, 1));
-        in.size = {kWidth, kHeight};
+        in.size = {kOutlineWidth, kOutlineHeight};
         in.outlines = g.upload("outlines", std::span<const OutlineRecord>(code.records));
         in.outline_code = g.upload("outline code", std::span<const sdf::Instruction>(code.code));
         in.outline_count = 1;
@@ -204,7 +204,7 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
         const std::vector<uint32_t> owner = rhi::must(owners.get_as<uint32_t>()),
                                     visibility = rhi::must(words.get_as<uint32_t>());
         int ours = 0, theirs = 0, close = 0;
-        for (int i = 0; i < kWidth * kHeight; ++i) {
+        for (int i = 0; i < kOutlineWidth * kOutlineHeight; ++i) {
             const uint32_t* const w = visibility.data() + 4 * size_t(i);
             if (w[1] >> 28 == kSeenNothing) {
                 EXPECT_EQ(owner[size_t(i)], 0u);
@@ -212,7 +212,8 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
             }
             float t = 0;
             std::memcpy(&t, w, 4);
-            const vec3 d = shade::camera_direction_at(p.camera, float(i % kWidth) + 0.5f, float(i / kWidth) + 0.5f);
+            const vec3 d =
+                shade::camera_direction_at(p.camera, float(i % kOutlineWidth) + 0.5f, float(i / kOutlineWidth) + 0.5f);
             const vec3 at = frame.camera.position + d * (t * p.grid.voxel_size);
             const float to_a = length(at - a) - ra, to_b = length(at - b) - rb;
             // Within a voxel of the border either answer will do.
@@ -220,7 +221,7 @@ TEST_F(OutlineGpu, ABlendIsCutWhereBothAreEquallyNear) {
                 ++close;
                 continue;
             }
-            EXPECT_EQ(owner[size_t(i)], to_b < to_a ? 1u : 0u) << i % kWidth << ", " << i / kWidth;
+            EXPECT_EQ(owner[size_t(i)], to_b < to_a ? 1u : 0u) << i % kOutlineWidth << ", " << i / kOutlineWidth;
             (to_b < to_a ? ours : theirs) += 1;
         }
         EXPECT_GT(ours, 200);
@@ -238,9 +239,9 @@ TEST_F(OutlineGpu, AreTheSameFromEveryDistance) {
         frame.camera.target = {0, 0, 0};
         // So that it is seen at all from so far, and not larger than the picture from so near.
         frame.camera.fov_y_deg = std::clamp(170 / far, 4.5f, 85.0f);
-        const Picture plain = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        const Picture plain = rhi::must(renderer->render(frame, {.width = kOutlineWidth, .height = kOutlineHeight}));
         frame.outlines = {{frame.field->program().rows()[0], Outline{.color = {1, 0, 0}, .width_px = 4}}};
-        const Picture lined = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        const Picture lined = rhi::must(renderer->render(frame, {.width = kOutlineWidth, .height = kOutlineHeight}));
         EXPECT_EQ(lined.rgba, plain.rgba);
         double area = 0, changed = 0;
         for (size_t i = 0; i < plain.depth.size(); ++i) {
@@ -291,7 +292,8 @@ TEST_F(OutlineGpu, WhatIsHiddenHasALineWhereItIsAskedFor) {
             frame.meshes[0].outline = line;
         }
         const auto drawn = [&](bool hidden) {
-            return rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .outline_hidden = hidden}));
+            return rhi::must(
+                renderer->render(frame, {.width = kOutlineWidth, .height = kOutlineHeight, .outline_hidden = hidden}));
         };
         const Picture asked = drawn(true);
         EXPECT_EQ(asked.rgba, drawn(false).rgba) << kind;
@@ -306,10 +308,10 @@ TEST_F(OutlineGpu, WhatIsHiddenHasALineWhereItIsAskedFor) {
         };
         EXPECT_EQ(red(drawn(false)), 0) << kind;
         // The ring round its disc on the screen.
-        const shade::CameraParams eye = shade::camera_params(frame.camera, kWidth, kHeight);
+        const shade::CameraParams eye = shade::camera_params(frame.camera, kOutlineWidth, kOutlineHeight);
         const double far = std::sqrt(double(dot(at - frame.camera.position, at - frame.camera.position)));
         const double pixels =
-            0.5 * kHeight / std::sqrt(double(eye.up.x * eye.up.x + eye.up.y * eye.up.y + eye.up.z * eye.up.z));
+            0.5 * kOutlineHeight / std::sqrt(double(eye.up.x * eye.up.x + eye.up.y * eye.up.y + eye.up.z * eye.up.z));
         const double disc = pixels * double(radius) / std::sqrt(far * far - double(radius * radius));
         const double ring = std::numbers::pi * ((disc + 4) * (disc + 4) - disc * disc);
         EXPECT_NEAR(red(asked), ring, 0.1 * ring) << kind << ", 0.4 pixels of its width";
@@ -349,7 +351,7 @@ TEST_F(OutlineGpu, FollowWhatIsDrawnAsAnInstance) {
     of_edits.outlines = {{of_edits.field->program().rows()[2], line}};
     of_instances.outlines = {{1, line, 1}};
     const auto lined = [&](const Frame& frame) {
-        const Picture p = rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight}));
+        const Picture p = rhi::must(renderer->render(frame, {.width = kOutlineWidth, .height = kOutlineHeight}));
         std::vector<bool> red;
         for (size_t i = 0; i < p.depth.size(); ++i)
             red.push_back(p.srgb[4 * i] > 200 && p.srgb[4 * i + 1] < 60 && p.srgb[4 * i + 2] < 60);

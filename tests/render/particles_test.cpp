@@ -15,7 +15,7 @@ namespace {
 
 using field::worlds::edit;
 
-constexpr int kWidth = 96, kHeight = 72;
+constexpr int kDustWidth = 96, kDustHeight = 72;
 
 std::vector<Particle> cloud(int count, uint32_t seed, float most_radius) {
     std::mt19937 random(seed);
@@ -46,7 +46,7 @@ struct ParticlesGpu : testing::Test {
         frame.camera.position = {0.3f, 0.2f, 4};
         frame.camera.tone_map = ToneMap::None;
     }
-    Picture picture() { return rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight})); }
+    Picture picture() { return rhi::must(renderer->render(frame, {.width = kDustWidth, .height = kDustHeight})); }
     std::unique_ptr<Renderer> renderer;
     Frame frame;
 };
@@ -60,8 +60,8 @@ float from_axis(const Light& sun, vec3 p) {
 
 // What the kernel claims, without bins, in double precision.
 vec3 over(const Frame& frame, const Picture& bare, int x, int y) {
-    const size_t at = size_t(y * kWidth + x);
-    const shade::CameraParams eye = shade::camera_params(frame.camera, kWidth, kHeight);
+    const size_t at = size_t(y * kDustWidth + x);
+    const shade::CameraParams eye = shade::camera_params(frame.camera, kDustWidth, kDustHeight);
     const vec3 d = shade::camera_direction_at(eye, float(x) + 0.5f, float(y) + 0.5f);
     std::vector<std::pair<double, const Particle*>> order;
     for (const Particle& p : frame.particles) {
@@ -107,18 +107,18 @@ TEST_F(ParticlesGpu, CoverWhatIsBehindThemFromNearToFar) {
     EXPECT_GT(dark, 1);
     const Picture p = picture();
     double worst = 0, changed = 0;
-    for (int y = 0; y < kHeight; ++y) {
-        for (int x = 0; x < kWidth; ++x) {
+    for (int y = 0; y < kDustHeight; ++y) {
+        for (int x = 0; x < kDustWidth; ++x) {
             const vec3 wanted = over(frame, bare, x, y);
-            const float* got = &p.rgba[size_t(y * kWidth + x) * 4];
+            const float* got = &p.rgba[size_t(y * kDustWidth + x) * 4];
             const double off = std::max({std::fabs(double(got[0] - wanted.x)), std::fabs(double(got[1] - wanted.y)),
                                          std::fabs(double(got[2] - wanted.z))});
             worst = std::max(worst, off);
-            changed += std::fabs(double(got[0] - bare.rgba[size_t(y * kWidth + x) * 4])) > 0.01;
+            changed += std::fabs(double(got[0] - bare.rgba[size_t(y * kDustWidth + x) * 4])) > 0.01;
         }
     }
     EXPECT_LT(worst, 0.004);  // what is left of light is not followed below a thousandth
-    EXPECT_GT(changed, 0.5 * kWidth * kHeight);
+    EXPECT_GT(changed, 0.5 * kDustWidth * kDustHeight);
 }
 
 // Of the first sun: by the field, by instances, by meshes with rays and with maps.
@@ -136,9 +136,9 @@ TEST_F(ParticlesGpu, LieInTheShadowOfWhatIsSolid) {
     // Beside the ball, and under it.
     frame.particles = {puff({-1.2f, -1, 0}), puff({0, -1, 0})};
     const auto brightness = [&](const Picture& p, vec3 at) {
-        const shade::CameraParams eye = shade::camera_params(frame.camera, kWidth, kHeight);
+        const shade::CameraParams eye = shade::camera_params(frame.camera, kDustWidth, kDustHeight);
         const vec2 px = shade::camera_pixel(eye, at - frame.camera.position);
-        return p.rgba[size_t(int(px.y) * kWidth + int(px.x)) * 4];
+        return p.rgba[size_t(int(px.y) * kDustWidth + int(px.x)) * 4];
     };
     const Picture by_field = picture();
     EXPECT_GT(brightness(by_field, {-1.2f, -1, 0}), 0.1f);
@@ -146,7 +146,7 @@ TEST_F(ParticlesGpu, LieInTheShadowOfWhatIsSolid) {
     frame.meshes = {meshes::at(meshes::sphere(0.4f, 20, meshes::matte({0.5f, 0.5f, 0.5f})), {-1.2f, 0.2f, 0})};
     for (const MeshShadows shadows : {MeshShadows::Rays, MeshShadows::Cascades}) {
         const Picture p =
-            rhi::must(renderer->render(frame, {.width = kWidth, .height = kHeight, .mesh_shadows = shadows}));
+            rhi::must(renderer->render(frame, {.width = kDustWidth, .height = kDustHeight, .mesh_shadows = shadows}));
         EXPECT_LT(brightness(p, {-1.2f, -1, 0}), 0.001f) << int(shadows);
     }
     frame.meshes.clear();
@@ -190,9 +190,9 @@ TEST_F(ParticlesGpu, BehindClearGlassAreSeenThroughIt) {
     const Picture behind = picture();
     frame.instances[0].pose.position.z = frame.instances[0].before.position.z = -2;
     const Picture before = picture();
-    const vec2 at = shade::camera_pixel(shade::camera_params(frame.camera, kWidth, kHeight),
+    const vec2 at = shade::camera_pixel(shade::camera_params(frame.camera, kDustWidth, kDustHeight),
                                         frame.particles[0].position - frame.camera.position);
-    const size_t pixel = (size_t(at.y) * kWidth + size_t(at.x)) * 4;
+    const size_t pixel = (size_t(at.y) * kDustWidth + size_t(at.x)) * 4;
     EXPECT_NEAR(open.rgba[pixel], 2.0f, 0.05f);
     EXPECT_NEAR(before.rgba[pixel], 2.0f, 0.05f);
     EXPECT_NEAR(behind.rgba[pixel], 0.5f, 0.03f);

@@ -19,7 +19,7 @@ namespace {
 
 using scene::RandomChanges;
 
-Edit ball(float radius, vec3 at = {}) {
+Edit ball_at(float radius, vec3 at = {}) {
     Edit e;
     e.node.shape = Sphere{.radius = radius};
     e.node.transform.position = at;
@@ -61,7 +61,7 @@ Shown shown(const World& world, bool field = true) {
 
 TEST(History, NothingIsRememberedBeforeItIsAskedFor) {
     World world;
-    ASSERT_TRUE(world.add(ball(1)));
+    ASSERT_TRUE(world.add(ball_at(1)));
     History history = world.history();
     EXPECT_EQ(history.now(), 0u);
     EXPECT_FALSE(*history.undo());
@@ -72,7 +72,7 @@ TEST(History, NothingIsRememberedBeforeItIsAskedFor) {
 TEST(History, UndoBringsAnEditBackUnderItsIdNameAndPlace) {
     World world;
     History history = world.history();
-    const EditId a = *world.add(ball(1)), b = *world.add(ball(2)), c = *world.add(ball(3));
+    const EditId a = *world.add(ball_at(1)), b = *world.add(ball_at(2)), c = *world.add(ball_at(3));
     const Edit before = *world.find(b);
     ASSERT_TRUE(world.remove(b));
     EXPECT_EQ(world.find(b), nullptr);
@@ -90,9 +90,9 @@ TEST(History, UndoBringsAnEditBackUnderItsIdNameAndPlace) {
 TEST(History, AnIdOfOneBranchIsNoEditOfAnother) {
     World world;
     History history = world.history();
-    const EditId a = *world.add(ball(1));
+    const EditId a = *world.add(ball_at(1));
     ASSERT_TRUE(*history.undo());
-    const EditId b = *world.add(ball(2));
+    const EditId b = *world.add(ball_at(2));
     EXPECT_NE(a, b);
     EXPECT_EQ(world.find(a), nullptr);
     ASSERT_TRUE(history.go_to(1));
@@ -103,11 +103,11 @@ TEST(History, AnIdOfOneBranchIsNoEditOfAnother) {
 TEST(History, AChangeAfterAnUndoKeepsTheOldBranchInReach) {
     World world;
     History history = world.history();
-    ASSERT_TRUE(world.add(ball(1)));
-    ASSERT_TRUE(world.add(ball(1, {0, 5, 0})));  // step 2
+    ASSERT_TRUE(world.add(ball_at(1)));
+    ASSERT_TRUE(world.add(ball_at(1, {0, 5, 0})));  // step 2
     const std::string first = world.to_json();
     ASSERT_TRUE(*history.undo());
-    ASSERT_TRUE(world.add(ball(1, {0, 9, 0})));  // step 3, another child of 1
+    ASSERT_TRUE(world.add(ball_at(1, {0, 9, 0})));  // step 3, another child of 1
     const std::string second = world.to_json();
     ASSERT_TRUE(history.go_to(2));
     EXPECT_EQ(world.to_json(), first);
@@ -129,12 +129,12 @@ TEST(History, AChangeAfterAnUndoKeepsTheOldBranchInReach) {
 TEST(History, AGroupIsOneStepAndADragInItIsOneChange) {
     World world;
     History history = world.history();
-    const EditId a = *world.add(ball(1));
+    const EditId a = *world.add(ball_at(1));
     const std::string before = world.to_json();
     history.begin_group("drag");
     history.begin_group("inner");
-    for (int i = 0; i < 100; ++i) ASSERT_TRUE(world.change(a, ball(1, {float(i), 0, 0})));
-    ASSERT_TRUE(world.add(ball(2)));
+    for (int i = 0; i < 100; ++i) ASSERT_TRUE(world.change(a, ball_at(1, {float(i), 0, 0})));
+    ASSERT_TRUE(world.add(ball_at(2)));
     ASSERT_TRUE(history.end_group());
     EXPECT_FALSE(history.undo()) << "a group is open";
     EXPECT_FALSE(history.forget());
@@ -154,7 +154,7 @@ TEST(History, AGroupIsOneStepAndADragInItIsOneChange) {
     EXPECT_EQ(history.steps().size(), 2u);
     history.begin_group("regretted");
     ASSERT_TRUE(world.remove(a));
-    ASSERT_TRUE(world.add(ball(3)));
+    ASSERT_TRUE(world.add(ball_at(3)));
     world.lights.emplace_back();
     ASSERT_TRUE(history.cancel_group());
     EXPECT_EQ(world.to_json(), after);
@@ -164,10 +164,10 @@ TEST(History, AGroupIsOneStepAndADragInItIsOneChange) {
 TEST(History, WhatIsAssignedToPublicMembersIsAStepToo) {
     World world;
     History history = world.history();
-    ASSERT_TRUE(world.add(ball(1)));
+    ASSERT_TRUE(world.add(ball_at(1)));
     world.lights.push_back({.illuminance = 7});
     world.environment = Environment{.intensity = 2};
-    ASSERT_TRUE(world.add(ball(2)));
+    ASSERT_TRUE(world.add(ball_at(2)));
     ASSERT_EQ(history.steps().size(), 4u);
     EXPECT_EQ(history.steps()[1].title, "lights");
     ASSERT_TRUE(*history.undo());
@@ -191,7 +191,7 @@ TEST(History, AMaterialAndAnObjectComeAndGo) {
     EXPECT_FALSE(world.add_material("", {}));
     EXPECT_FALSE(world.add_material("bad", {.roughness = std::nanf("")}));
     EXPECT_FALSE(world.add_material("bad\xff", {}));
-    Edit e = ball(1);
+    Edit e = ball_at(1);
     e.node.material = clay;
     ASSERT_TRUE(world.add(e));
     EXPECT_EQ(history.steps().size(), 3u);
@@ -252,7 +252,7 @@ TEST(History, UndoBakesNoMoreThanTheEditDid) {
     world.field_settings = {.voxel_size = 0.02f, .cells = 64, .levels = 1, .bounds = Box3{{-2, -2, -2}, {2, 2, 2}}};
     for (int i = 0; i < 200; ++i)
         ASSERT_TRUE(world.add(
-            ball(0.3f, {float(i % 6) * 0.6f - 1.5f, float(i / 6 % 6) * 0.6f - 1.5f, float(i / 36) * 0.6f - 1.5f})));
+            ball_at(0.3f, {float(i % 6) * 0.6f - 1.5f, float(i / 6 % 6) * 0.6f - 1.5f, float(i / 36) * 0.6f - 1.5f})));
     History history = world.history();
     ASSERT_TRUE(world.frame());
     const EditId id = world.edits()[100];
@@ -273,7 +273,7 @@ TEST(History, UndoBakesNoMoreThanTheEditDid) {
     };
     check([&] { return world.change(id, moved); });
     check([&] { return world.remove(id); });
-    check([&] { return bool(world.add(ball(0.2f, {0.1f, 0.3f, 0.9f}))); });
+    check([&] { return bool(world.add(ball_at(0.2f, {0.1f, 0.3f, 0.9f}))); });
 }
 
 struct Work {
@@ -288,7 +288,7 @@ TEST(History, InAWorldWithLevelsAnUndoLooksAtTheCellsOfTheEditAndBakesTheirBrick
     world.field_settings = {.voxel_size = 0.05f, .cells = 32, .levels = 3, .bounds = {}};
     for (int i = 0; i < 60; ++i)
         ASSERT_TRUE(world.add(
-            ball(0.7f, {float(i % 5) * 1.3f - 2.6f, float(i / 5 % 4) * 1.3f - 2, float(i / 20) * 1.3f - 1.3f})));
+            ball_at(0.7f, {float(i % 5) * 1.3f - 2.6f, float(i / 5 % 4) * 1.3f - 2, float(i / 20) * 1.3f - 1.3f})));
     History history = world.history();
     const auto work = [&] {
         Work sum;
@@ -331,36 +331,36 @@ TEST(History, InAWorldWithLevelsAnUndoLooksAtTheCellsOfTheEditAndBakesTheirBrick
     check("a blend", [&] { return with([](Edit& e) { e.blend_radius = 0.3f; }); });
     check("a cut instead", [&] { return with([](Edit& e) { e.op = Op::Subtract; }); });
     check("a removal", [&] { return world.remove(id); });
-    check("an addition in the crowd", [&] { return bool(world.add(ball(0.5f, {0.1f, 0.3f, 0.9f}))); });
-    check("an addition in the open", [&] { return bool(world.add(ball(0.4f, {0, 3.6f, 0}))); });
+    check("an addition in the crowd", [&] { return bool(world.add(ball_at(0.5f, {0.1f, 0.3f, 0.9f}))); });
+    check("an addition in the open", [&] { return bool(world.add(ball_at(0.4f, {0, 3.6f, 0}))); });
     check("another place in the list", [&] { return world.reorder(id, world.edits()[3]); });
 }
 
 TEST(History, ADragBetweenTwoFramesIsOneChangeOfTheField) {
     World world;
     world.field_settings = {.voxel_size = 0.05f, .cells = 64, .levels = 1, .bounds = Box3{{-2, -2, -2}, {2, 2, 2}}};
-    ASSERT_TRUE(world.add(ball(1)));
-    const EditId id = *world.add(ball(0.2f, {1, 0, 0}));
+    ASSERT_TRUE(world.add(ball_at(1)));
+    const EditId id = *world.add(ball_at(0.2f, {1, 0, 0}));
     const auto first = world.frame();
-    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(world.change(id, ball(0.2f, {1, float(i) * 0.001f, 0})));
+    for (int i = 0; i < 1000; ++i) ASSERT_TRUE(world.change(id, ball_at(0.2f, {1, float(i) * 0.001f, 0})));
     const auto last = world.frame();
     EXPECT_EQ(last->field->parent_revision(), first->field->revision()) << "updated, not built again";
     World fresh;
     fresh.field_settings = world.field_settings;
-    ASSERT_TRUE(fresh.add(ball(1)));
-    ASSERT_TRUE(fresh.add(ball(0.2f, {1, 999 * 0.001f, 0})));
+    ASSERT_TRUE(fresh.add(ball_at(1)));
+    ASSERT_TRUE(fresh.add(ball_at(0.2f, {1, 999 * 0.001f, 0})));
     EXPECT_EQ(field_hash(world), field_hash(fresh));
 }
 
 TEST(History, EditsThatNoFileCouldHoldAreRefusedAndOthersMadePlain) {
     World world;
-    Edit e = ball(1);
+    Edit e = ball_at(1);
     e.name = "bad\xff";
     EXPECT_FALSE(world.add(e));
-    e = ball(1);
+    e = ball_at(1);
     e.outline = Outline{.width_px = -1};
     EXPECT_FALSE(world.add(e));
-    e = ball(1, {-0.0f, 0, 0});
+    e = ball_at(1, {-0.0f, 0, 0});
     e.node.transform.rotation = {0, 0, 0, 1.0005f};
     e.node.shape.data = "nothing";
     e.node.blend_radius = 3;
@@ -376,7 +376,7 @@ TEST(History, EditsThatNoFileCouldHoldAreRefusedAndOthersMadePlain) {
 TEST(HistorySlow, AMillionEditsAndUndosGiveTheirMemoryBack) {
     World world;
     for (int i = 0; i < 1000; ++i)
-        ASSERT_TRUE(world.add(ball(0.3f, {float(i % 10), float(i / 10 % 10), float(i / 100)})));
+        ASSERT_TRUE(world.add(ball_at(0.3f, {float(i % 10), float(i / 10 % 10), float(i / 100)})));
     RandomChanges random(5);
     const std::string before = world.to_json();
     const auto round = [&](int edits) {
@@ -386,7 +386,7 @@ TEST(HistorySlow, AMillionEditsAndUndosGiveTheirMemoryBack) {
             const EditId id = ids[size_t(random.below(1000))];
             switch (i % 4) {
             case 0:
-                ASSERT_TRUE(world.change(id, ball(random.number(0.1f, 0.5f), random.point(10))));
+                ASSERT_TRUE(world.change(id, ball_at(random.number(0.1f, 0.5f), random.point(10))));
                 break;
             case 1:
                 ASSERT_TRUE(world.reorder(id, ids[size_t(random.below(1000))]));
@@ -395,7 +395,7 @@ TEST(HistorySlow, AMillionEditsAndUndosGiveTheirMemoryBack) {
                 ASSERT_TRUE(world.remove(id));
                 break;
             default:
-                ASSERT_TRUE(world.add(ball(0.2f, random.point(10))));
+                ASSERT_TRUE(world.add(ball_at(0.2f, random.point(10))));
             }
             ASSERT_TRUE(*history.undo() || i % 4 == 1);
         }

@@ -21,6 +21,7 @@
 using namespace kiln;
 using nlohmann::json;
 using scene::engines;
+using scene::kSlit;
 using scene::Played;
 using scene::run;
 using scene::Simulation;
@@ -29,7 +30,7 @@ using testing::HasSubstr;
 namespace {
 
 // All kinds of bodies in the air, a pillar to be cut, a character that walks, runs and jumps.
-constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.05},
+constexpr const char* kEveryKind = R"({"format": 1, "field": {"voxel_size": 0.05},
   "materials": {"ice": {"friction": 0.05}},
   "edits": [
     {"id": "ground", "shape": "plane"},
@@ -46,9 +47,6 @@ constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.05},
     {"id": "cube", "mesh": "m", "linear_velocity": [0, 0, -1], "angular_velocity": [1, 1, 0], "collision": "convex"}],
   "characters": [{"id": "w", "position": [8, 0.01, 8], "path": [{"time": 0.1, "direction": [1, 0, 0]},
     {"time": 0.9, "direction": [0, 0, 1]}, {"time": 1.1, "direction": [0, 0, 1], "jump": 3}]}]})";
-constexpr const char* kSlit =
-    R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
-
 class Keep : public testing::TestWithParam<std::string> {
 protected:
     void SetUp() override {
@@ -59,7 +57,7 @@ protected:
             for (const char* f : {"4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"})
                 out << "f " << f << "\n";
         }
-        std::ofstream(file_) << kScene;
+        std::ofstream(file_) << kEveryKind;
     }
     World opened() const {
         auto world = World::open(file_);

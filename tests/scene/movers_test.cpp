@@ -6,6 +6,7 @@
 #include "field/clipmap.h"
 #include "field/field.h"
 #include "field/host_bricks.h"
+#include "simulated.h"
 
 #include <kiln/world.h>
 
@@ -18,11 +19,7 @@
 namespace kiln {
 namespace {
 
-World parsed(const std::string& json) {
-    auto world = World::parse(json, "test.kiln.json");
-    EXPECT_TRUE(world) << (world ? "" : world.error().message);
-    return world ? std::move(*world) : World();
-}
+using scene::parsed;
 
 uint64_t bricks_of(const World& world) {
     auto frame = world.frame();

@@ -16,13 +16,14 @@
 
 using namespace kiln;
 using scene::engines;
+using scene::kSlit;
 using scene::parsed;
 using scene::Played;
 using testing::HasSubstr;
 
 namespace {
 
-constexpr Camera kCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
+constexpr Camera kPartsCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
 
 // A pillar with a painted belt and a smooth head, to be cut through below them.
 constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
@@ -34,15 +35,12 @@ constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
     {"id": "belt", "shape": "box", "half_extents": [1, 0.1, 1], "position": [0, 2.8, 0], "op": "paint", "material": "red"},
     {"id": "ball", "shape": "sphere", "radius": 0.2, "position": [5, 0.2, 0]}],
   "bodies": [{"id": "b", "edits": ["ball"]}]})";
-constexpr const char* kSlit =
-    R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
-
 std::string_view material_at(const World& world, vec3 p) { return world.material_name(world.sample(p).material); }
 
 TEST(Parts, ArePartOfTheSolidInTheirOwnColoursAndMoveInPictures) {
     for (const std::string& engine : engines()) {
         Played p(engine, kPillar);
-        EXPECT_EQ(p.shown(kCamera).instances.size(), 1u);
+        EXPECT_EQ(p.shown(kPartsCamera).instances.size(), 1u);
         p.apply(kSlit);
         p.run(1);
         // As it hangs there, a step fallen, world and part are what the dig left, each point once.
@@ -62,18 +60,18 @@ TEST(Parts, ArePartOfTheSolidInTheirOwnColoursAndMoveInPictures) {
         EXPECT_GT(solid, 300);
         EXPECT_EQ(material_at(kept, {0.31f, 2.8f, 0}), "red") << engine;
         EXPECT_EQ(material_at(kept, {0.31f, 2.4f, 0}), "stone") << engine;
-        const Frame frame = p.shown(kCamera);
+        const Frame frame = p.shown(kPartsCamera);
         ASSERT_EQ(frame.instances.size(), 2u) << engine << ": it stands apart";
         const float height = frame.instances[1].pose.position.y;
         p.run(20);
-        const Frame later = p.shown(kCamera);
+        const Frame later = p.shown(kPartsCamera);
         EXPECT_LT(later.instances[1].pose.position.y, height - 0.2f) << engine;
         EXPECT_EQ(later.instances[1].before, frame.instances[1].pose) << engine << ": motion";
         const World flying = p.kept();
         EXPECT_EQ(flying.find(*flying.find_edit("part1"))->node.transform.position, later.instances[1].pose.position)
             << engine << ": kept in flight";
         p.run(400);
-        EXPECT_EQ(p.shown(kCamera).instances.size(), 1u) << engine << ": it is ground again";
+        EXPECT_EQ(p.shown(kPartsCamera).instances.size(), 1u) << engine << ": it is ground again";
         const World settled = p.kept();
         EXPECT_LT(settled.distance({0, 1.8f, 0}), 0) << engine << ": it stands on the stump";
         EXPECT_GT(settled.distance({0, 3.7f, 0}), 0);
@@ -173,7 +171,7 @@ TEST(Parts, ThatAreLooseAreNoEditsOfTheWorldForCommands) {
         ASSERT_FALSE(refused);
         EXPECT_THAT(refused.error().message, HasSubstr("editor: \"part1\" is a body's"));
         p.run(1);
-        EXPECT_EQ(p.shown(kCamera).instances.size(), 2u) << engine;
+        EXPECT_EQ(p.shown(kPartsCamera).instances.size(), 2u) << engine;
         // Kept by a world that is not the one that was played: refused whole.
         World other = parsed(R"({"format": 1, "edits": [{"id": "slit", "shape": "sphere"}]})");
         const std::string before = other.to_json();

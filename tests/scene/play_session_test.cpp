@@ -14,23 +14,21 @@
 
 using namespace kiln;
 using scene::engines;
+using scene::kSlit;
 using testing::HasSubstr;
 
 namespace {
 
-constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.05},
+constexpr const char* kPillarAndBall = R"({"format": 1, "field": {"voxel_size": 0.05},
   "edits": [
     {"id": "ground", "shape": "plane"},
     {"id": "pillar", "shape": "box", "half_extents": [0.3, 2, 0.3], "position": [0, 1.5, 0]},
     {"id": "ball", "shape": "sphere", "radius": 0.2, "position": [5, 1, 0]}],
   "bodies": [{"id": "b", "edits": ["ball"]}]})";
-constexpr const char* kSlit =
-    R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
-
 class Sessions : public testing::TestWithParam<std::string> {
 protected:
     void SetUp() override {
-        std::ofstream(file_) << kScene;
+        std::ofstream(file_) << kPillarAndBall;
         auto opened = World::open(file_);
         ASSERT_TRUE(opened) << opened.error().message;
         world_ = std::move(*opened);

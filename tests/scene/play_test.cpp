@@ -28,7 +28,7 @@ using testing::HasSubstr;
 
 namespace {
 
-constexpr Camera kCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
+constexpr Camera kPlayCamera{.position = {0, 2, 6}, .target = {0, 0.5f, 0}};
 
 constexpr const char* kScene = R"({"format": 1, "field": {"voxel_size": 0.1},
   "edits": [
@@ -45,7 +45,7 @@ Play started(const World& world, const std::string& engine) {
 }
 
 Frame shown(Play& play, const PlayLines& lines = {}) {
-    auto frame = play.frame(kCamera, lines);
+    auto frame = play.frame(kPlayCamera, lines);
     EXPECT_TRUE(frame) << (frame ? "" : frame.error().message);
     return frame ? std::move(*frame) : Frame();
 }
@@ -182,7 +182,7 @@ TEST(Play, BakesNothingOfWhatTheWorldThatItBeginsFromHasBaked) {
           R"({"add": {"id": "hill", "shape": "sphere", "position": [-4, -0.5, 0], "blend_radius": 0.2}})",
           R"({"remove": "gone"})", R"({"add": {"id": "dent", "shape": "sphere", "op": "subtract", "radius": 0.3}})"})
         ASSERT_TRUE(world.apply(command));
-    const auto drawn = world.frame(kCamera);
+    const auto drawn = world.frame(kPlayCamera);
     ASSERT_TRUE(drawn);
     const uint64_t baked = drawn->field->revision();
     const World read = parsed(world.to_json());
@@ -221,7 +221,7 @@ TEST(Play, BakesNothingOfWhatTheWorldThatItBeginsFromHasBaked) {
         EXPECT_LT(shown(play).field->stats().bricks_baked, dug.field->stats().bricks / 4) << engine;
     }
     EXPECT_EQ(world.to_json(), text) << "the world stays as it is";
-    EXPECT_EQ(world.frame(kCamera)->field->revision(), baked);
+    EXPECT_EQ(world.frame(kPlayCamera)->field->revision(), baked);
 }
 
 TEST(Play, WhatWasMovedByHandStartsWhereTheListHasIt) {
@@ -233,7 +233,7 @@ TEST(Play, WhatWasMovedByHandStartsWhereTheListHasIt) {
       "bodies": [{"id": "b", "edits": ["ball"]}]})");
     ASSERT_TRUE(world.move(*world.find_edit("loose"), {{3, 2, 0}, {}}));
     ASSERT_TRUE(world.move(*world.find_edit("blended"), {{-4, 0, 0}, {}}));
-    ASSERT_TRUE(world.frame(kCamera));
+    ASSERT_TRUE(world.frame(kPlayCamera));
     Play play = started(world, engines().front());
     const World read = parsed(world.to_json());
     Play other = started(read, engines().front());
@@ -254,7 +254,7 @@ TEST(Play, LinesAreThoseOfTheContactsTheShapesAndTheSleepers) {
         ASSERT_TRUE(made);
         scene::Simulation& simulation = **made;
         const auto count = [&](const PlayLines& lines) {
-            auto frame = simulation.frame(kCamera, 1, lines);
+            auto frame = simulation.frame(kPlayCamera, 1, lines);
             EXPECT_TRUE(frame);
             return frame->lines;
         };
@@ -312,7 +312,7 @@ TEST(PlayGpu, ABodyLooksAsIfTheSceneHadItWhereItIs) {
             edit.node.transform.rotation = pose.rotation;
             ASSERT_TRUE(there.change(id, edit));
         }
-        const auto still = there.frame(kCamera);
+        const auto still = there.frame(kPlayCamera);
         ASSERT_TRUE(still);
         const RenderSettings settings{.width = 64, .height = 40};
         const auto played = renderer->render(frame, settings);
@@ -322,7 +322,7 @@ TEST(PlayGpu, ABodyLooksAsIfTheSceneHadItWhereItIs) {
         size_t differ = 0;
         for (size_t i = 0; i < played->srgb.size(); ++i) differ += std::abs(played->srgb[i] - placed->srgb[i]) > 2;
         EXPECT_LE(differ, 8u) << engine;  // bytes of 10240
-        const auto at_start = renderer->render(*world.frame(kCamera), settings);
+        const auto at_start = renderer->render(*world.frame(kPlayCamera), settings);
         ASSERT_TRUE(at_start);
         size_t moved = 0;
         for (size_t i = 0; i < played->srgb.size(); ++i) moved += std::abs(played->srgb[i] - at_start->srgb[i]) > 2;

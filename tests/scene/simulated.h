@@ -13,6 +13,10 @@
 
 namespace kiln::scene {
 
+/// A command: a cut through a pillar at the height of 1.8 m.
+inline constexpr const char* kSlit =
+    R"({"add": {"id": "slit", "shape": "box", "half_extents": [1, 0.2, 1], "position": [0, 1.8, 0], "op": "subtract"}})";
+
 inline std::vector<std::string> engines() {
     std::vector<std::string> out;
     for (const PhysicsBackend& b : physics_backends())

@@ -20,12 +20,12 @@ namespace {
 
 constexpr double kTolerance = 5e-5;
 
-struct Scene {
+struct Judged {
     std::vector<Edit> edits;
     Program program;
     Judge judge;
 
-    explicit Scene(std::vector<Edit> list)
+    explicit Judged(std::vector<Edit> list)
         : edits(std::move(list)), program(*compile({edits, {}, {}})), judge(*Judge::create({edits, {}, {}})) {}
 };
 
@@ -95,7 +95,7 @@ double dense_reference(const Judge& judge, dvec3 p) {
     return std::min_element(best.begin(), best.end(), [](const Best& a, const Best& b) { return a.t < b.t; })->t;
 }
 
-void expect_true_distances(const Scene& scene, int points, float extent, unsigned seed) {
+void expect_true_distances(const Judged& scene, int points, float extent, unsigned seed) {
     const Regions regions(scene.program);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> at(-extent, extent);
@@ -125,7 +125,7 @@ TEST(Nearest, IsTheTrueDistanceInsideUnionsAndCuts) {
                                        : Shape(Box{.half_extents = {size(random), size(random), 0.2f}});
         edits.push_back(edit(shape, p, i % 4 == 3 ? Op::Subtract : Op::Union));
     }
-    expect_true_distances(Scene(edits), 24, 0.9f, 1);
+    expect_true_distances(Judged(edits), 24, 0.9f, 1);
 }
 
 TEST(Nearest, IsTheTrueDistanceInBlendsWarpsAndStretchedShapes) {
@@ -134,12 +134,12 @@ TEST(Nearest, IsTheTrueDistanceInBlendsWarpsAndStretchedShapes) {
                             edit(Cylinder{.half_height = 0.6f, .radius = 0.15f}, {0, 0, 0.1f}, Op::Subtract, 0.05f)};
     edits[1].node.domain.push_back(Twist{.rate = 1.0f});
     edits[0].node.transform.scale = {1, 0.6f, 1.3f};
-    expect_true_distances(Scene(edits), 15, 0.8f, 2);
+    expect_true_distances(Judged(edits), 15, 0.8f, 2);
 }
 
 TEST(Nearest, SeesThatABoundIsTooShort) {
     // Two balls: deep in the overlap the union's value is the larger ball's depth, the surface is farther.
-    const Scene scene({edit(Sphere{.radius = 1}, {-0.6f, 0, 0}), edit(Sphere{.radius = 1}, {0.6f, 0, 0})});
+    const Judged scene({edit(Sphere{.radius = 1}, {-0.6f, 0, 0}), edit(Sphere{.radius = 1}, {0.6f, 0, 0})});
     const Regions regions(scene.program);
     const Nearest n = nearest_surface(regions, {0, 0, 0}, 10, 1e-5);
     EXPECT_NEAR(scene.judge.distance({0, 0, 0}), -0.4, 1e-6);
@@ -147,26 +147,26 @@ TEST(Nearest, SeesThatABoundIsTooShort) {
 }
 
 TEST(Nearest, IsRightFarAwayAndWhereAllPointsAreEquallyNear) {
-    const Scene ball({edit(Sphere{.radius = 1}, {0, 0, 0})});
+    const Judged ball({edit(Sphere{.radius = 1}, {0, 0, 0})});
     const Regions regions(ball.program);
     for (const double x : {0.0, 5.0, 70.0, 1000.0, 1e5}) {
         const Nearest n = nearest_surface(regions, {x, 0, 0}, std::numeric_limits<double>::infinity(), kTolerance);
         ASSERT_TRUE(n.found) << x;
         EXPECT_NEAR(n.distance, std::abs(x - 1), 1e-6 * (1 + x)) << x;
     }
-    const Scene ground({edit(Plane{}, {0, 0, 0})});
+    const Judged ground({edit(Plane{}, {0, 0, 0})});
     const Regions flat(ground.program);
     const Nearest n = nearest_surface(flat, {3, -200, 7}, std::numeric_limits<double>::infinity(), kTolerance);
     EXPECT_NEAR(n.distance, 200, 1e-5);
 }
 
 TEST(Nearest, LooksNoFartherThanAsked) {
-    const Scene scene({edit(Sphere{.radius = 1}, {-0.6f, 0, 0}), edit(Sphere{.radius = 1}, {0.6f, 0, 0})});
+    const Judged scene({edit(Sphere{.radius = 1}, {-0.6f, 0, 0}), edit(Sphere{.radius = 1}, {0.6f, 0, 0})});
     const Regions regions(scene.program);
     EXPECT_FALSE(nearest_surface(regions, {0, 0, 0}, 0.799, 1e-5).found);
     EXPECT_TRUE(nearest_surface(regions, {0, 0, 0}, 0.801, 1e-5).found);
     EXPECT_FALSE(nearest_surface(regions, {0, 9, 0}, 1, 1e-5).found);
-    EXPECT_FALSE(nearest_surface(Regions(Scene({}).program), {0, 0, 0}, 1, 1e-5).found);
+    EXPECT_FALSE(nearest_surface(Regions(Judged({}).program), {0, 0, 0}, 1, 1e-5).found);
 }
 
 TEST(Regions, GiveTheWholeProgramsValueEverywhereFromAnyThread) {
@@ -176,7 +176,7 @@ TEST(Regions, GiveTheWholeProgramsValueEverywhereFromAnyThread) {
     for (int i = 0; i < 300; ++i)
         edits.push_back(edit(Sphere{.radius = 0.1f}, {at(random), at(random), at(random)},
                              i % 5 == 4 ? Op::Subtract : Op::Union, i % 3 == 0 ? 0.05f : 0.0f));
-    const Scene scene(edits);
+    const Judged scene(edits);
     const Regions regions(scene.program);
     std::vector<std::thread> threads;
     std::atomic<int> wrong = 0;
@@ -201,7 +201,7 @@ TEST(Regions, AskTheEditsAroundAPointNotAllOfThem) {
     std::uniform_real_distribution<float> at(-1, 1);
     std::vector<Edit> edits;
     for (int i = 0; i < 3000; ++i) edits.push_back(edit(Sphere{.radius = 0.03f}, {at(random), at(random), at(random)}));
-    const Scene scene(edits);
+    const Judged scene(edits);
     const Regions regions(scene.program);
     size_t instructions = 0;
     for (int i = 0; i < 200; ++i) {
@@ -213,7 +213,8 @@ TEST(Regions, AskTheEditsAroundAPointNotAllOfThem) {
 }
 
 TEST(SolidInBox, IsTrueWhereTheBoxHoldsASolidPoint) {
-    const Scene scene({edit(Sphere{.radius = 0.5f}, {0, 0, 0}), edit(Sphere{.radius = 0.3f}, {0, 0, 0}, Op::Subtract)});
+    const Judged scene(
+        {edit(Sphere{.radius = 0.5f}, {0, 0, 0}), edit(Sphere{.radius = 0.3f}, {0, 0, 0}, Op::Subtract)});
     const Regions regions(scene.program);
     const auto box = [&](dvec3 c, vec3 h, quat q = {}) { return solid_in_box(regions, c, h, q, 1e-4); };
     EXPECT_TRUE(box({0.6, 0, 0}, {0.11f, 0.1f, 0.1f}));

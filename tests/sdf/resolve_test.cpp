@@ -13,7 +13,7 @@
 namespace kiln::sdf {
 namespace {
 
-struct Scene {
+struct OneEdit {
     std::vector<Edit> edits{Edit{}};
     std::vector<Object> objects;
     HeightGrid grid{kGridSide, kGridSide, {std::begin(kGrid), std::end(kGrid)}};
@@ -113,7 +113,7 @@ std::string describe(const Node& node) {
     out << " scale (" << s.x << ' ' << s.y << ' ' << s.z << ")";
     return out.str();
 }
-std::string describe(const Scene& scene) {
+std::string describe(const OneEdit& scene) {
     std::string out = "\nedit: " + describe(scene.edits[0].node);
     for (const Object& o : scene.objects) {
         out += "\nobject:";
@@ -142,7 +142,7 @@ bool outside_point(RandomValues& random, const Box3& box, double size, Point& p)
 }
 
 // The smallest value / (rate · distance) seen; infinite where the scene does not compile or nothing is outside.
-double expect_rate(RandomValues& random, const Scene& scene, int points) {
+double expect_rate(RandomValues& random, const OneEdit& scene, int points) {
     double tightest = std::numeric_limits<double>::infinity();
     const Result<Program> program = compile(scene.source());
     if (!program) return tightest;
@@ -174,7 +174,7 @@ Around around_edit(const Program& program) {
     return Around({{b.min.x, b.min.y, b.min.z}, {b.max.x, b.max.y, b.max.z}});
 }
 
-void expect_one_lipschitz(RandomValues& random, const Scene& scene, int points) {
+void expect_one_lipschitz(RandomValues& random, const OneEdit& scene, int points) {
     const Result<Program> program = compile(scene.source());
     if (!program) return;
     const Around around = around_edit(*program);
@@ -195,7 +195,7 @@ INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachShape, testing::Range(0, int(shape_rows(
 
 TEST_P(RateOfEachShape, IsOneUnderUniformScaleAndHoldsUnderAny) {
     for_all("shape", [&](RandomValues& random) {
-        Scene scene;
+        OneEdit scene;
         scene.node().shape = random_shape(random, GetParam());
         scene.node().transform = random_transform(random);
         expect_rate(random, scene, 60);
@@ -215,7 +215,7 @@ INSTANTIATE_TEST_SUITE_P(Sdf, RateOfEachWarp, testing::Range(0, int(warp_rows().
 TEST_P(RateOfEachWarp, AndSlopeHoldOverShapesOfAnyScale) {
     int judged = 0;
     for_all("warp", [&](RandomValues& random) {
-        Scene scene;
+        OneEdit scene;
         Object squeezed;
         squeezed.nodes.emplace_back();
         squeezed.nodes[0].shape = random_shape(random);
@@ -237,7 +237,7 @@ TEST(Rate, HoldsOverRandomTrees) {
     int judged = 0;
     for (int round = 0; round < 10; ++round) {
         for_all("trees", [&](RandomValues& random) {
-            Scene scene;
+            OneEdit scene;
             for (int o = 0; o < 3; ++o) scene.objects.push_back(random_tree(random, 12, o));
             scene.node().kind = Node::Kind::Object;
             scene.node().object = ObjectId{2, 0};
@@ -254,7 +254,7 @@ TEST(Trees, AreOneLipschitzAndTheJudgesValue) {
     int judged = 0;
     for (int round = 0; round < 5 || (judged < kEnough && round < 50); ++round) {
         for_all("trees", [&](RandomValues& random) {
-            Scene scene;
+            OneEdit scene;
             for (int o = 0; o < 2; ++o) scene.objects.push_back(random_tree(random, 8, o));
             scene.node().kind = Node::Kind::Object;
             scene.node().object = ObjectId{1, 0};
@@ -289,8 +289,8 @@ Node shaped(Shape shape, vec3 scale = {1, 1, 1}, vec3 position = {}) {
     return out;
 }
 
-Scene folded(Op op, float blend_radius, const std::vector<Node>& children) {
-    Scene scene;
+OneEdit folded(Op op, float blend_radius, const std::vector<Node>& children) {
+    OneEdit scene;
     Object object;
     object.nodes.emplace_back();
     object.nodes[0].kind = Node::Kind::Fold;
@@ -307,7 +307,7 @@ Scene folded(Op op, float blend_radius, const std::vector<Node>& children) {
 }
 
 TEST(Rate, RoundOfASqueezedBallReachesFarther) {
-    Scene scene;
+    OneEdit scene;
     Object squeezed;
     squeezed.nodes = {shaped(Sphere{.radius = 0.5f}, {1, 1, 6})};
     scene.objects.push_back(squeezed);
@@ -324,7 +324,7 @@ TEST(Slope, WhereTheEndsOfAnUnevenBarMeetTheValueDoesNotJump) {
     Object bar;
     bar.nodes = {shaped(Cone{.half_height = 3.1f, .radius_bottom = 0.4f, .radius_top = 0.05f})};
     bar.nodes[0].transform.rotation = axis_angle({0, 0, 1}, -1.5707964f);  // along X
-    Scene scene;
+    OneEdit scene;
     scene.objects.push_back(bar);
     scene.node().kind = Node::Kind::Object;
     scene.node().object = ObjectId{0, 0};
@@ -339,7 +339,7 @@ TEST(Slope, NearTheCentreOfABendHoldsForAChildThatGrowsSlowly) {
     // Its value grows by a twentieth along Y, so it is small at the centre of the circle, around which the bend stretches without end.
     Object plank;
     plank.nodes = {shaped(Box{.half_extents = {2.4f, 0.02f, 0.2f}}, {1, 20, 1})};
-    Scene scene;
+    OneEdit scene;
     scene.objects.push_back(plank);
     scene.node().kind = Node::Kind::Object;
     scene.node().object = ObjectId{0, 0};
@@ -357,19 +357,19 @@ TEST(Slope, NearTheCentreOfABendHoldsForAChildThatGrowsSlowly) {
 }
 
 TEST(Rate, ManyBlendedBallsOnOneSpotBulgeFartherThanTwo) {
-    const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(6, shaped(Sphere{.radius = 0.5f})));
+    const OneEdit scene = folded(Op::Union, 0.4f, std::vector<Node>(6, shaped(Sphere{.radius = 0.5f})));
     EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0.7, 0, 0}), 0) << "a pair reaches 0.6";
     for_all("balls", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 TEST(Rate, SqueezedOnesBulgeByTheirRateFarther) {
-    const Scene scene = folded(Op::Union, 0.4f, std::vector<Node>(2, shaped(Sphere{.radius = 0.5f}, {1, 1, 4})));
+    const OneEdit scene = folded(Op::Union, 0.4f, std::vector<Node>(2, shaped(Sphere{.radius = 0.5f}, {1, 1, 4})));
     EXPECT_LT(evaluate(view(*compile(scene.source())), dvec3{0, 0, 2.35}), 0) << "the pair alone reaches 2";
     for_all("balls", [&](RandomValues& random) { expect_rate(random, scene, 200); });
 }
 
 TEST(Rate, DisplacedGroundIsBoundedByItsHighestHill) {
-    Scene scene;
+    OneEdit scene;
     scene.node().shape = Plane{};
     scene.node().domain = {Displace{.amplitude = 0.2f, .frequency = 3}};
     const auto program = compile(scene.source());
@@ -380,20 +380,20 @@ TEST(Rate, DisplacedGroundIsBoundedByItsHighestHill) {
 }
 
 TEST(Rate, AnIntersectionsBoxIsFartherThanAnyOfItsOperands) {
-    const Scene scene = folded(Op::Intersect, 0,
-                               {shaped(Box{.half_extents = {0.2f, 2, 2}}), shaped(Box{.half_extents = {2, 0.2f, 2}}),
-                                shaped(Box{.half_extents = {2, 2, 0.2f}})});
+    const OneEdit scene = folded(Op::Intersect, 0,
+                                 {shaped(Box{.half_extents = {0.2f, 2, 2}}), shaped(Box{.half_extents = {2, 0.2f, 2}}),
+                                  shaped(Box{.half_extents = {2, 2, 0.2f}})});
     const auto program = compile(scene.source());
     EXPECT_NEAR(program->edits[0].rate, 1 / std::sqrt(3.0f), 1e-6f);
     EXPECT_NEAR(evaluate(view(*program), dvec3{1.2, 1.2, 1.2}), 1, 1e-6) << "sqrt(3) from the box";
     for_all("corner", [&](RandomValues& random) { expect_rate(random, scene, 200); });
-    const Scene one =
+    const OneEdit one =
         folded(Op::Intersect, 0, {shaped(Sphere{.radius = 2}), shaped(Box{.half_extents = {0.2f, 0.2f, 0.2f}})});
     EXPECT_EQ(compile(one.source())->edits[0].rate, 1) << "every face is the box's";
 }
 
 TEST(Rate, AGapPulledOpenBesideTheShapeIsInsideItsBounds) {
-    Scene scene;
+    OneEdit scene;
     Object aside;
     aside.nodes = {shaped(Sphere{.radius = 0.2f}, {1, 1, 1}, {-0.3f, 0, 0})};
     scene.objects.push_back(aside);

@@ -53,6 +53,8 @@ namespace kiln::sdf::text64 {
 #include "sdf/texts.gen.inl"
 #undef KILN_SCALAR
 #undef KILN_HOST
+#undef KILN_SDF
+#undef KILN_C
 }  // namespace kiln::sdf::text64
 
 namespace kiln::sdf {

@@ -22,7 +22,7 @@ constexpr float kPushedOut = 0.2f, kMovedOut = 0.4f;  // of the depth, a step
 
 using Quad = float __attribute__((vector_size(16)));
 Quad to_quad(const btVector3& v) { return Quad{v.x(), v.y(), v.z(), 0}; }
-btVector3 to_bullet(Quad q) { return {q[0], q[1], q[2]}; }
+btVector3 from_quad(Quad q) { return {q[0], q[1], q[2]}; }
 
 }  // namespace
 
@@ -281,12 +281,12 @@ void ContactSolver::end(float seconds) {
     const bool pushed = std::any_of(contacts_.begin(), contacts_.end(), [](const Contact& c) { return c.pushed > 0; });
     for (const Body& b : std::span(bodies_).subspan(1, moving_)) {
         btRigidBody& body = const_cast<btRigidBody&>(*b.body);
-        body.setLinearVelocity(to_bullet(b.now.linear));
-        body.setAngularVelocity(to_bullet(b.now.angular));
+        body.setLinearVelocity(from_quad(b.now.linear));
+        body.setAngularVelocity(from_quad(b.now.angular));
         if (!pushed) continue;
         btTransform next;
-        btTransformUtil::integrateTransform(body.getWorldTransform(), to_bullet(b.push.linear),
-                                            to_bullet(b.push.angular), seconds, next);
+        btTransformUtil::integrateTransform(body.getWorldTransform(), from_quad(b.push.linear),
+                                            from_quad(b.push.angular), seconds, next);
         body.setWorldTransform(next);
     }
 }

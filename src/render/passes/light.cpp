@@ -11,10 +11,6 @@
 
 namespace kiln::render {
 
-namespace {
-constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
-}  // namespace
-
 const Kernel kLight{"light", kLightSpv};
 const Kernel kLightImage{"light image", kLightSpv, kWithImage};
 

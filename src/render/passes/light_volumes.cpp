@@ -13,7 +13,6 @@ namespace kiln::render {
 
 namespace {
 
-constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
 constexpr rhi::ColorTarget kAdded[] = {{.format = rhi::Format::Rgba16Float,
                                         .blend = true,
                                         .color = {rhi::BlendFactor::One, rhi::BlendFactor::One},

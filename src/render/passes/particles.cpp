@@ -9,10 +9,6 @@
 
 namespace kiln::render {
 
-namespace {
-constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
-}  // namespace
-
 const Kernel kParticles{"particles", kParticlesSpv};
 const Kernel kParticlesStart{"particles start", kParticlesStartSpv};
 const Kernel kParticlesLight{"particles light", kParticlesLightSpv};

@@ -24,6 +24,9 @@
 
 namespace kiln::render {
 
+// What of a frame's passes reads a sky: here from an image.
+inline constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
+
 extern const Kernel kBakeHalf, kBakeSnorm8, kBakeCopyHalf, kBakeCopySnorm8;
 extern const Kernel kMarch, kMarchLevels, kMarchInstances, kMarchLevelsInstances, kMarchExact, kRefine, kSettle,
     kResolve, kResolveExact, kResolveLevels, kResolveLevelsExact, kShadow, kShadowExact, kShadowHorizons, kShadowLevels,

@@ -20,10 +20,6 @@
 
 namespace kiln::render {
 
-namespace {
-constexpr rhi::SpecConstant kWithImage[] = {{6, 1}};
-}  // namespace
-
 const Kernel kMarchGlass{"march glass", kMarchGlassSpv};
 const Kernel kThroughBegin{"through begin", kThroughBeginSpv};
 const Kernel kThroughLayer{"through layer", kThroughLayerSpv};
