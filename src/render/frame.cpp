@@ -11,6 +11,7 @@
 #include "render/passes/light_volumes.h"
 #include "render/passes/upscale.h"
 
+#include <algorithm>
 #include <cmath>
 #include <tuple>
 
@@ -124,6 +125,11 @@ Result<FrameParams> frame_params(const Frame& frame, const RenderSettings& setti
     p.outside_first = field.outside_first();
     std::ranges::copy(field.planes(), p.planes);
     p.outside_count = field.outside_count();
+    const Box3& outside = field.outside_box();
+    const auto voxels = [&](float metres) { return std::clamp(metres / p.grid.voxel_size, -1e30f, 1e30f); };
+    p.outside_low_x = voxels(outside.min.x), p.outside_high_x = voxels(outside.max.x);
+    p.outside_low_y = voxels(outside.min.y), p.outside_high_y = voxels(outside.max.y);
+    p.outside_low_z = voxels(outside.min.z), p.outside_high_z = voxels(outside.max.z);
     p.program_count = field.program_count();
     p.params_first = field.params_first();
     p.light_count = uint32_t(frame.lights.size());

@@ -16,6 +16,7 @@
 #include <array>
 #include <chrono>
 #include <cstring>
+#include <limits>
 
 namespace kiln::render {
 
@@ -260,6 +261,8 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     std::vector<sdf::Instruction> out{sdf::Instruction::make(sdf::Opcode::Empty, 0, 0, 0, 0, 0)};
     bool adds = false;
     bool concave = true;
+    Box3 solids;
+    float blends = 0;  // metres: a union bulges by less than its blend radius
     planes_.clear();
     std::vector<uint32_t> rows;
     program.index.everywhere(rows);
@@ -267,7 +270,11 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
               [&](uint32_t a, uint32_t b) { return program.edits[a].order < program.edits[b].order; });
     for (const uint32_t row : rows) {
         const sdf::EditSpan& edit = program.edits[row];
-        adds = adds || edit.op == Op::Union;
+        if (edit.op == Op::Union) {
+            adds = true;
+            solids = box_union(solids, edit.bounds);
+            blends += edit.blend;
+        }
         const auto code = program.code.subspan(edit.first, edit.count);
         for (sdf::Instruction in : code) {
             // What the GPU cannot run stands as solid: its box is cut by the instruction that follows. Where such a shape intersects, the
@@ -291,6 +298,9 @@ std::vector<sdf::Instruction> GpuField::outside_code() {
     }
     if (!adds) out.clear();
     outside_is_concave_ = adds && concave;
+    const float far = std::numeric_limits<float>::infinity();
+    outside_box_ =
+        concave ? Box3{{-far, -far, -far}, {far, far, far}} : solids.inflated(blends);  // half-spaces are solved
     const auto not_plain = [](const HorizonPlane& plane) { return plane.scale == 0; };
     if (!outside_is_concave_ || planes_.size() > size_t(kMostPlanes) || std::ranges::any_of(planes_, not_plain))
         planes_.clear();

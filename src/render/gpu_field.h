@@ -80,6 +80,8 @@ public:
     uint32_t params_first() const;   // in the numbers buffer
     uint32_t outside_first() const;  // in the program buffer
     uint32_t outside_count() const { return outside_count_; }
+    // Holds all that is solid in what leaves the grid, metres.
+    const Box3& outside_box() const { return outside_box_; }
     uint32_t program_count() const { return program_count_; }
     uint64_t atlas_bytes() const;
     uint32_t bricks_baked() const { return bricks_baked_; }  // by the last update()
@@ -147,6 +149,7 @@ private:
     uint64_t atlas_number_ = 0;
     uint32_t outside_count_ = 0, program_count_ = 0;
     bool outside_is_concave_ = false;
+    Box3 outside_box_;
     std::vector<HorizonPlane> planes_;
     TapeUse use_, outside_use_;
     bool use_known_ = false;  // both only ever grow from there

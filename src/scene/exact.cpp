@@ -121,7 +121,8 @@ void clip(dvec3 o, dvec3 d, const Box3& box, double& from, double& to) {
 // How far a search for the nearest point may miss, metres: relative where floats are coarser.
 double tolerance_at(dvec3 p) { return std::max(5e-5, 2e-7 * largest(p)); }
 
-constexpr size_t kChunk = 64;  // questions that share a cursor
+constexpr size_t kChunk = 64;       // questions that share a cursor
+constexpr int kMostSteps = 200000;  // of a ray; only endless rows of things that it always just passes ask for so many
 
 // answer(i, cursor) for every i, on all cores.
 template <typename Answer>
@@ -157,6 +158,76 @@ struct Way {
     }
     dvec3 at(double t) const { return add(origin, direction, t); }
 };
+
+// How far to go on along a ray. Sphere tracing takes steps as short as the nearest solid is near, without end where a ray runs along a
+// plane. Where steps stay short, whole pieces of the way are shown to be free instead, which grow while that succeeds.
+class Strides {
+public:
+    Strides(const sdf::Regions& regions, const Way& way) : regions_(regions), way_(way) {}
+
+    // From t, where the value is `value`; no value up to there is below `room`.
+    double next(double t, double value, double room, sdf::Regions::Cursor cursor) {
+        const double step = value - room;
+        if (--until_ > 0) return step;
+        const double leap = passes(t, value, room, kWorth * step, cursor);
+        wait_ = leap > 0 ? 0 : std::clamp(2 * wait_, kPatience, kMostPatience);
+        until_ = wait_;
+        return std::max(leap, step);
+    }
+
+    // How far all values from t on are above `room`: at least `least` or as far as code is known, else 0.
+    double passes(double t, double value, double room, double least, sdf::Regions::Cursor cursor) {
+        // Where the last leap came nearer to something, this one goes almost as far as that would be met.
+        if (before_ >= 0 && value < value_)
+            stride_ = std::min(stride_, 0.9 * (value - room) * (t - before_) / (value_ - value));
+        before_ = -1;
+        const double end = end_of(t, cursor);
+        least = std::min(least, end);
+        for (double length = std::clamp(stride_, least, end);; length = std::max(0.25 * length, least)) {
+            stride_ = length;
+            if (free(t, length, room, cursor)) {
+                before_ = t, value_ = value;
+                stride_ = 4 * length;
+                return length;
+            }
+            if (length <= least) return 0;
+        }
+    }
+
+private:
+    static constexpr int kPatience = 16, kMostPatience = 64;  // steps before the next try
+    static constexpr double kWorth = 4;                      // steps that a leap must replace
+
+    bool free(double t, double length, double room, sdf::Regions::Cursor cursor) const {
+        const double half = 0.5 * length;
+        const dvec3 reach{way_.direction.x * half, way_.direction.y * half, way_.direction.z * half};
+        const sdf::Program& program = regions_.program();
+        return sdf::least_on_segment(program, cursor != nullptr ? cursor->code : program.tape(), way_.at(t + half),
+                                     reach) > room;
+    }
+
+    // How far the code that is right at t stays so: a little way beyond the region's border, that the next point may lie in the next one.
+    double end_of(double t, sdf::Regions::Cursor cursor) const {
+        if (cursor == nullptr) return std::max(way_.to - t, 0.0) + 1;
+        const dvec3 p = way_.at(t), d = way_.direction, c = cursor->center;
+        const auto axis = [&](double at, double direction, double center) {
+            if (direction == 0) return std::numeric_limits<double>::infinity();
+            return (center + std::copysign(cursor->half, direction) - at) / direction;
+        };
+        const double exit = std::min({axis(p.x, d.x, c.x), axis(p.y, d.y, c.y), axis(p.z, d.z, c.z)});
+        return std::max(exit, 0.0) + 0.5 * sdf::region_margin(c, cursor->half);
+    }
+
+    const sdf::Regions& regions_;
+    const Way& way_;
+    int wait_ = kPatience, until_ = kPatience;
+    double stride_ = 0;               // metres to try next
+    double before_ = -1, value_ = 0;  // where the last leap began, and the value there; -1: none just now
+};
+
+// What counts as touching, metres: relative where floats are coarser. A ray that passes by so near does not, if it does so for some of them.
+double touch_at(dvec3 p) { return 1e-7 * (1 + largest(p)); }
+constexpr double kPassTouches = 10;
 
 }  // namespace
 
@@ -200,20 +271,25 @@ void ExactField::cast(std::span<const Ray> rays, RayHit* out) const {
     for_each_question(rays.size(), [&](size_t i, sdf::Regions::Cursor& cursor) { out[i] = cast(rays[i], cursor); });
 }
 
-// Sphere tracing (Hart, 1996) on a 1-Lipschitz field, then bisection of the last step where it crossed.
+// Sphere tracing (Hart, 1996) on a 1-Lipschitz field, with leaps; then bisection of the last step where it crossed.
 RayHit ExactField::cast(const Ray& ray, sdf::Regions::Cursor& cursor) const {
     const Way way(program_, reach_, ray, 0);
     double t = way.from, before = t;
     bool hit = false;
-    for (int steps = 0; t <= way.to && steps < 200000; ++steps) {
+    Strides strides(regions_, way);
+    for (int steps = 0; t <= way.to && steps < kMostSteps; ++steps) {
         const dvec3 p = way.at(t);
-        const double d = regions_.at(p, cursor);
-        if (d <= 1e-7 * (1 + largest(p))) {
-            hit = true;
-            break;
+        const double d = regions_.at(p, cursor), touch = touch_at(p);
+        double step = 0;
+        if (d > touch) {
+            step = strides.next(t, d, 0, cursor);
+        } else if (d > 0) {
+            step = strides.passes(t, d, 0, kPassTouches * touch, cursor);
         }
+        hit = !(step > 0);
+        if (hit) break;
         before = t;
-        t += d;
+        t += step;
     }
     if (!hit) return {};
     if (regions_.at(way.at(t), cursor) < 0 && t > before) {
@@ -252,12 +328,13 @@ RayHit ExactField::cast_sphere(const Ray& ray, float radius) const {
     const Way way(program_, reach_, ray, r);
     sdf::Regions::Cursor cursor = nullptr;
     double t = way.from;
+    Strides strides(regions_, way);
     for (int steps = 0; t <= way.to && steps < 20000; ++steps) {
         const dvec3 center = way.at(t);
         const double touch = 0.4 * tolerance_at(center);
         const double value = regions_.at(center, cursor);
         if (value - r > touch) {
-            t += value - r;
+            t += strides.next(t, value, r, cursor);
             continue;
         }
         sdf::Nearest near{.found = true, .distance = 0, .least = 0, .point = center};

@@ -177,4 +177,131 @@ double zero_bound(const TapeView& tape, dvec3 p_world) {
     return least[0];
 }
 
+namespace {
+
+constexpr uint32_t kNoEdit = UINT32_MAX;
+
+double size_of(exact::real3 v) { return std::sqrt(exact::dot(v, v)); }
+double largest(exact::real3 v) { return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)}); }
+
+// M of affine() times v: how P changes where C (or P before) changes by v.
+exact::real3 turned(exact::real3 v, const float* w) {
+    return {double(w[3]) * v.x + double(w[4]) * v.y + double(w[5]) * v.z,
+            double(w[6]) * v.x + double(w[7]) * v.y + double(w[8]) * v.z,
+            double(w[9]) * v.x + double(w[10]) * v.y + double(w[11]) * v.z};
+}
+
+// The world's operation on the edit in R1 (program.h): there its value is whole.
+bool ends_edit(const Instruction& in) {
+    if (in.dst() != 0) return false;
+    switch (in.opcode()) {
+    case Opcode::Combine:
+    case Opcode::Take:
+        return in.b() == 1;
+    case Opcode::Move:
+    case Opcode::Negate:
+        return in.a() == 1;
+    default:
+        return false;
+    }
+}
+
+// Metres between the box and the one around a segment; 0 where they meet.
+double gap_of(const Box3& box, exact::real3 middle, exact::real3 half) {
+    if (box.empty()) return 0;
+    const auto axis = [](float low, float high, double center, double reach) {
+        return std::max({double(low) - (center + std::fabs(reach)), center - std::fabs(reach) - double(high), 0.0});
+    };
+    return size_of({axis(box.min.x, box.max.x, middle.x, half.x), axis(box.min.y, box.max.y, middle.y, half.y),
+                    axis(box.min.z, box.max.z, middle.z, half.z)});
+}
+
+}  // namespace
+
+double least_on_segment(const Program& program, std::span<const Instruction> code, dvec3 middle, dvec3 half) {
+    const exact::real3 center(middle.x, middle.y, middle.z), reach(half.x, half.y, half.z);
+    // Floats make slopes steeper by some of their ulps, doubles values wrong by some of theirs.
+    const double rounding = 2e-15 * (largest(center) + largest(reach));
+    const double way = size_of(reach) * (1 + 1e-6) + rounding;
+    exact::Registers r, low, high;  // at the middle; and the least and most on the segment
+    r.memory = static_cast<exact::Chunk*>(memory_of(program.memory_slots, sizeof(exact::Chunk)));
+    exact::set_point(r.cell, 0, center);
+    exact::real3 change = reach;  // of P from the middle to the end
+    bool straight = true;         // P is an affine function of the way
+    uint32_t edit = kNoEdit;      // whose code this is
+    const exact::Samples samples{program.samples.data()};
+    const float* params = program.params.data();
+    for (const Instruction& in : code) {
+        const float* w = params + in.param;
+        exact::run_distance(r, &in.word, 1, params, samples);
+        if (in.has_material()) edit = uint32_t(w[2]);
+        if (edit != kNoEdit && ends_edit(in)) {
+            const EditSpan& span = program.edits[edit];
+            const double gap = gap_of(span.bounds, center, reach) - rounding;
+            if (gap > 0) low.value[1].v[0] = std::max(low.value[1].v[0], double(span.rate) * gap);
+        }
+        const uint32_t dst = in.dst(), a = in.a(), b = in.b();
+        double &least = low.value[dst].v[0], &most = high.value[dst].v[0];
+        const double value = r.value[dst].v[0];
+        const auto within = [&](double spread) { least = value - spread, most = value + spread; };
+        switch (in.opcode()) {
+        case Opcode::PointCell:
+        case Opcode::PointTranslate:
+            change = reach;
+            straight = true;
+            break;
+        case Opcode::PointAffine:
+            change = turned(reach, w);
+            straight = true;
+            break;
+        case Opcode::PointAffineOn:
+            change = turned(change, w);
+            break;
+        case Opcode::PointWarp:
+        case Opcode::PointCopy:
+        case Opcode::PointClamp:
+            straight = false;
+            break;
+        case Opcode::Arithmetic:  // a number, no distance
+            break;
+        case Opcode::Shape:
+            within(straight && in.aux() == uint32_t(ShapeKind::Plane) ? std::fabs(change.y * double(w[0])) + rounding
+                                                                      : way);
+            break;
+        case Opcode::Combine: {
+            const bool takes_away = (in.aux() & 3u) == uint32_t(Op::Subtract);
+            exact::Chunk lower, upper;
+            exact::combine(lower, low.value[a], takes_away ? high.value[b] : low.value[b], in.aux() & 3u, double(w[0]));
+            exact::combine(upper, high.value[a], takes_away ? low.value[b] : high.value[b], in.aux() & 3u,
+                           double(w[0]));
+            least = std::max(lower.v[0], value - way);
+            most = std::min(upper.v[0], value + way);
+            break;
+        }
+        case Opcode::Move:
+            least = low.value[a].v[0], most = high.value[a].v[0];
+            break;
+        case Opcode::Negate: {
+            const double below = -high.value[a].v[0];
+            most = -low.value[a].v[0], least = below;
+            break;
+        }
+        case Opcode::Take: {
+            const bool negative = in.aux() == 1u;
+            const double lower = negative ? -high.value[b].v[0] : low.value[b].v[0];
+            most = negative ? -low.value[b].v[0] : high.value[b].v[0], least = lower;
+            break;
+        }
+        case Opcode::Empty:
+        case Opcode::Constant:
+            within(0);
+            break;
+        default:
+            within(way);
+            break;
+        }
+    }
+    return low.value[0].v[0];
+}
+
 }  // namespace kiln::sdf

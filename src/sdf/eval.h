@@ -54,6 +54,11 @@ double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix = nullptr,
 /// How near a zero of the tape can be to p at least, metres: a zero of hard operations is a zero of one of their operands, and each
 /// operand changes by no more than one moves.
 double zero_bound(const TapeView& tape, dvec3 p_world);
+/// A lower bound of the values on the segment from middle - half to middle + half, metres. `code` is the program's or a pruned piece of it.
+/// A half-space's change on the way is known, another leaf's is at most the way, and an edit outside of whose box the segment stays is as
+/// far as that box says; operations are monotone in each operand, so intervals pass through them (segment tracing: Galin, Guerin, Paris and
+/// Peytavie, "Segment Tracing Using Local Lipschitz Bounds", 2020; ours asks for no other bound of a slope than that of a plane).
+double least_on_segment(const Program& program, std::span<const Instruction> code, dvec3 middle, dvec3 half);
 
 /// Float evaluation is off by a few ulps of the coordinates and values involved; 2^-18 of their size covers 64 of them.
 inline constexpr float kPruneUlps = 3.8e-6f;

@@ -63,6 +63,7 @@ TEST(Layout, FrameParamsAreTheSameInEveryKernel) {
     for (uint32_t i = 0; i < 12; ++i) expected.push_back(AT(FrameParams, width) + i * 4);
     for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, sky) + i * 16);
     for (uint32_t i = 0; i < 4; ++i) expected.push_back(AT(FrameParams, view) + i * 4);
+    for (uint32_t i = 0; i < 8; ++i) expected.push_back(AT(FrameParams, outside_low_x) + i * 4);
     for (uint32_t i = 0; i < 8; ++i) expected.push_back(AT(FrameParams, planes) + i * 4);  // the first of them
     EXPECT_EQ(AT(FrameParams, pixel_angle), AT(FrameParams, eye_x) + 28);
     EXPECT_EQ(AT(FrameParams, params_first), AT(FrameParams, width) + 44);

@@ -80,6 +80,82 @@ TEST(Exact, RaysEndOnTheSurfaceAndPassNothing) {
     EXPECT_GT(hits, 100);
 }
 
+TEST(Exact, RaysAlongThingsWithoutEndReachWhatStandsFarAway) {
+    // Millions of the steps that the plane allows.
+    const std::string wall = ",{\"shape\": \"box\", \"position\": [5000, 0, 0], \"half_extents\": [1, 5, 5]}";
+    const std::string row =
+        "{\"shape\": \"sphere\", \"radius\": 0.5, \"position\": [0, -0.5, 0], \"domain\": [{\"warp\": \"repeat\", "
+        "\"spacing\": [1.5, 0, 1.5]}]}";
+    for (const std::string& endless : {std::string("{\"shape\": \"plane\"}"), row}) {
+        const Compiled c = compiled(scene_with(endless + wall));
+        const ExactField exact(c.program);
+        const RayHit hit = exact.cast({.origin = {0, 2e-3f, 0}, .direction = {1, 0, 0}});
+        ASSERT_TRUE(hit.hit) << endless;
+        EXPECT_NEAR(double(hit.t), 4999, 1e-3);
+        EXPECT_EQ(hit.edit.index, 1u);
+        const RayHit ball = exact.cast_sphere({.origin = {0, 0.252f, 0}, .direction = {1, 0, 0}}, 0.25f);
+        ASSERT_TRUE(ball.hit) << endless;
+        EXPECT_NEAR(double(ball.t), 4998.75, 2e-3);
+        EXPECT_FALSE(exact.cast({.origin = {0, 2e-3f, 0}, .direction = {-1, 0, 0}}).hit);
+        EXPECT_FALSE(exact.cast({.origin = {0, 2e-3f, 0}, .direction = {-1, 1e-9f, 0}}).hit);
+    }
+    const Compiled plain = compiled(scene_with("{\"shape\": \"plane\"}"));
+    const RayHit down = ExactField(plain.program).cast({.origin = {0, 1, 0}, .direction = {1, -1e-5f, 0}});
+    ASSERT_TRUE(down.hit);
+    EXPECT_NEAR(double(down.t), 1e5, 10);
+}
+
+// Worlds of many edits, so that space is halved, on a floor and beside a row without end; rays that mostly run along them.
+TEST(Exact, LeapsLoseNoHit) {
+    std::mt19937 random(11);
+    const auto in = [&](float lo, float hi) { return std::uniform_real_distribution<float>(lo, hi)(random); };
+    const auto number = [](float v) { return std::to_string(v); };
+    int hits = 0, misses = 0;
+    for (int world = 0; world < rounds(8); ++world) {
+        std::string edits =
+            "{\"shape\": \"plane\"}, {\"shape\": \"box\", \"half_extents\": [0.2, 0.6, 0.2], "
+            "\"position\": [4, 0, -3], \"domain\": [{\"warp\": \"repeat\", \"spacing\": [0, 0, 1.5]}]}";
+        for (int i = 0; i < 30; ++i) {
+            edits += std::string(",{\"shape\": \"") + (i % 2 == 0 ? "sphere" : "torus") + "\", \"op\": \"" +
+                     (i % 5 == 4 ? "subtract" : "union") + "\", \"blend_radius\": " + (i % 3 == 0 ? "0.2" : "0") +
+                     ", \"position\": [" + number(in(-3, 3)) + "," + number(in(-0.4f, 1)) + "," + number(in(-3, 3)) +
+                     "]}";
+        }
+        const Compiled c = compiled(scene_with(edits));
+        const sdf::Judge judge = *sdf::Judge::create(c.source);
+        const ExactField exact(c.program);
+        for (int k = 0; k < 60; ++k) {
+            const float angle = in(0, 6.28f), rise = k % 3 == 0 ? 0 : in(-0.1f, 0.03f);
+            const Ray ray{.origin = {in(-6, 6), in(0.02f, 1.2f), in(-6, 6)},
+                          .direction = normalize(vec3{std::cos(angle), rise, std::sin(angle)}),
+                          .t_max = 40};
+            const auto at = [&](double t) {
+                return judge.distance({double(ray.origin.x) + t * double(ray.direction.x),
+                                       double(ray.origin.y) + t * double(ray.direction.y),
+                                       double(ray.origin.z) + t * double(ray.direction.z)});
+            };
+            // The slow way: into solid, by steps that are never longer than what is free.
+            double solid = 0;
+            while (solid <= 40) {
+                const double d = at(solid);
+                if (d < -1e-6) break;
+                solid += std::max(0.5 * d, 1e-4);
+            }
+            const RayHit hit = exact.cast(ray);
+            if (solid <= 40) {
+                ASSERT_TRUE(hit.hit) << "world " << world << ", ray " << k << ": solid at " << solid;
+                EXPECT_LE(double(hit.t), solid + 1e-5) << "world " << world << ", ray " << k;
+            }
+            if (hit.hit) {
+                EXPECT_LE(at(double(hit.t)), 1e-5) << "world " << world << ", ray " << k;
+            }
+            ++(hit.hit ? hits : misses);
+        }
+    }
+    EXPECT_GT(hits, rounds(100));
+    EXPECT_GT(misses, rounds(20));
+}
+
 TEST(Exact, ShadowRayFromTheTableIsFree) {
     // Was blocked: an empty pruned tape reads as solid.
     const Compiled c = compiled(

@@ -63,7 +63,13 @@ float ao_reach(vec3 p, vec3 direction) {
     bool concave = (frame.flags & (kFrameOutsideConcave | kFrameUnpruned)) == kFrameOutsideConcave;
     bool beyond = (frame.outside_count != 0u && !concave) || (frame.flags & kFrameUnpruned) != 0u;
     vec3 size = vec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) * float(kBrickVoxels);
-    return max(t_out, 0.0) + (beyond ? 16.0 * length(size) : 1.0);
+    float reach = max(t_out, 0.0) + 1.0;
+    if (!beyond) return reach;
+    float beyond_in;
+    float beyond_out;
+    outside_stretch(texel_ray(shadow_whole, p, direction), beyond_in, beyond_out);
+    if ((frame.flags & kFrameUnpruned) != 0u) beyond_out = kFarVoxels;
+    return clamp(beyond_out, reach, max(t_out, 0.0) + 16.0 * length(size));
 }
 
 #ifdef KILN_EXACT

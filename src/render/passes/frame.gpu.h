@@ -47,6 +47,9 @@ struct FrameParams {
     uint material_count;
     float refine_reach;  // how far refining may move what march found, finest voxels, on the coarsest level or instance
     int first_row;       // of the tile's images, where the first row of this frame's band of it is
+    // Outside of this box, voxels of the world, the code of what leaves the grid has nothing solid.
+    float outside_low_x, outside_low_y, outside_low_z, pad_0;
+    float outside_high_x, outside_high_y, outside_high_z, pad_1;
     HorizonPlane planes[kMostPlanes];  // as many as kernels are made for, see TapeUse
 };
 
@@ -91,7 +94,7 @@ KILN_CONST uint kSeenMesh = 6u;     // triangle `slot` of the frame's meshes; z:
 KILN_CONST uint kSeenInstance = 7u;
 
 #ifdef __cplusplus
-static_assert(sizeof(FrameParams) == 384 && sizeof(HorizonPlane) == 32 && sizeof(FrameRay) == 48 &&
+static_assert(sizeof(FrameParams) == 416 && sizeof(HorizonPlane) == 32 && sizeof(FrameRay) == 48 &&
               sizeof(MaterialRecord) == 32);
 }  // namespace kiln::render
 #endif

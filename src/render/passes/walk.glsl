@@ -17,6 +17,7 @@ struct Walk {
     float segment_end;
     float t_end;        // of the whole walk
     float grid_in, grid_out;
+    float outside_in, outside_out;  // where solids of the program of what leaves the grid may be met
     int stage;          // what advance() looks at next
     uint state;         // kSeen… of a hit in it; kSeenInside: the walk stops in solid at t
     int slot;           // of kSeenPruned
@@ -31,6 +32,7 @@ Walk walk_begin(TexelRay ray, float t_begin, float t_end) {
     w.segment_end = t_begin;
     w.t_end = t_end;
     grid_stretch(ray, w.grid_in, w.grid_out);
+    outside_stretch(ray, w.outside_in, w.outside_out);
     w.stage = (frame.flags & kFrameUnpruned) != 0u ? kAfterGrid : kBeforeGrid;
     w.state = kSeenNothing;
     w.slot = 0;
@@ -43,20 +45,27 @@ Walk walk_begin(TexelRay ray, float t_begin, float t_end) {
 // Is w.t outside the grid?
 bool walk_outside(Walk w) { return w.t < w.grid_in || w.t >= w.grid_out || w.grid_in > w.grid_out; }
 
+// Makes what of the way from w.t to `end`, outside the grid, may meet something the next segment. False: nothing is there.
+bool walk_beyond(inout Walk w, float end) {
+    float begin = max(w.t, w.outside_in);
+    end = min(end, w.outside_out);
+    if (frame.outside_count == 0u || begin >= end) return false;
+    w.t = begin;
+    w.segment_end = end;
+    w.state = kSeenOutside;
+    return true;
+}
+
 // The next segment, from w.t on. False: there is none, or the walk stands in solid (state kSeenInside).
 bool walk_advance(TexelRay ray, inout Walk w, bool look_in_cells, bool jump) {
     bool unpruned = (frame.flags & kFrameUnpruned) != 0u;
     if (w.stage == kBeforeGrid) {
         bool meets = w.grid_in <= w.grid_out;
         w.stage = meets ? kInGrid : kWalkDone;
-        w.segment_end = meets ? min(w.grid_in, w.t_end) : w.t_end;
-        if (frame.outside_count != 0u && w.segment_end > w.t) {
-            w.state = kSeenOutside;
-            return true;
-        }
-        w.t = max(w.t, w.segment_end);
+        if (walk_beyond(w, meets ? min(w.grid_in, w.t_end) : w.t_end)) return true;
     }
     if (w.stage == kInGrid) {
+        w.t = max(w.t, w.grid_in);
         ivec3 up = ivec3(greaterThan(ray.direction, vec3(0.0)));
         ivec3 whole = ray.whole - grid_first_cell() * kBrickVoxels;
         ivec3 last = ivec3(frame.grid.size_x, frame.grid.size_y, frame.grid.size_z) - 1;
@@ -96,9 +105,14 @@ bool walk_advance(TexelRay ray, inout Walk w, bool look_in_cells, bool jump) {
     }
     if (w.stage == kAfterGrid) {
         w.stage = kWalkDone;
+        if (!unpruned) {
+            if (walk_beyond(w, w.t_end)) return true;
+            w.state = kSeenNothing;
+            return false;
+        }
         w.segment_end = w.t_end;
-        w.state = unpruned ? kSeenProgram : kSeenOutside;
-        return (unpruned ? frame.program_count : frame.outside_count) != 0u;
+        w.state = kSeenProgram;
+        return frame.program_count != 0u;
     }
     w.state = kSeenNothing;
     return false;
