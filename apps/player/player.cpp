@@ -30,6 +30,8 @@ constexpr double kCatchUp = 0.03;       // seconds a frame to run a play again
 constexpr double kBakeSeconds = 0.008;  // a frame, of worlds of several levels
 constexpr uint32_t kBakeBricks = 512;   // likewise, where no clock is asked
 constexpr int kMessageFrames = 180;
+constexpr double kLookAtFile = 1;  // seconds from one look at the scene file to the next
+constexpr int kFramesALook = 60;   // likewise, where no clock is asked
 constexpr int kFramesToRest =
     80;  // a round of the places in a pixel that rays go through, with a fourth as many of them
 constexpr float kBiteOfDistance = 0.03f;  // radius: as large on the screen from everywhere
@@ -97,6 +99,7 @@ private:
     void fly(float seconds);
     void walk();
     Result<void> start_or_stop_walking();
+    void look_at_file();
     bool walks() const { return hud_.walks; }
     void hold_mouse() {
         if (window_ && o_.keys.empty()) window_->hold_mouse(walks() || input_.button("right"));
@@ -142,6 +145,7 @@ private:
     float speed_ = 4;  // m/s
     vec3 walk_{};      // m/s, wished
     bool paused_ = false, profiler_ = false, done_ = false;
+    double looked_ = 0;                                               // seconds since the scene file was looked at
     double frame_seconds_ = 0, work_seconds_ = 0, rung_seconds_ = 0;  // smoothed; work: without waiting for the screen
     size_t rung_ = 0;
     int rung_since_ = 0;  // frame
@@ -359,6 +363,22 @@ Result<void> Player::start_or_stop_walking() {
     return {};
 }
 
+// Other programs may write the scene, too.
+void Player::look_at_file() {
+    const std::string before = session_->warning();
+    if (session_->look_at_file()) {
+        const std::string news = session_->file() + " was changed by another program and is loaded again";
+        message(news);
+        o_.say(news);
+        if (!session_->note().empty()) o_.say(session_->note());
+        hud_.walks = session_->walker().has_value();
+        last_input_ = frame_;
+    } else if (session_->warning() != before) {
+        if (!session_->warning().empty()) o_.say(session_->warning());
+        last_input_ = message_until_ = frame_;  // seen at once
+    }
+}
+
 Result<void> Player::use_tools() {
     const bool digs = input_.button("left"), adds = input_.button("middle") || input_.key("b");
     if (!digs && !adds) return session_->end_stroke();
@@ -447,6 +467,11 @@ Result<void> Player::run() {
         const double real = std::chrono::duration<double>(start - std::exchange(before, start)).count();
         const double seconds = replays() ? kReplayStep : std::min(real, kLongestFrame);
         if (auto taken = take_events(); !taken) return taken;
+        looked_ += replays() ? kLookAtFile / kFramesALook : real;
+        if (looked_ >= kLookAtFile) {
+            look_at_file();
+            looked_ = 0;
+        }
         fly(float(seconds));
         if (auto used = use_tools(); !used) return used;
         const double budget = replays() ? std::numeric_limits<double>::infinity() : kCatchUp;
@@ -463,7 +488,7 @@ Result<void> Player::run() {
         if (!hidden) {
             auto picture = draw(seconds);
             if (!picture) return picture.error();
-            if (frame_ >= message_until_) hud_.message.clear();
+            if (frame_ >= message_until_) hud_.message = session_->warning();
             describe(renderer_->stats());
             widgets = hud_.draw(*picture);
             last = std::move(*picture);
