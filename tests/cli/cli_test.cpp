@@ -121,9 +121,14 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"import a.csg -o b.kiln.json", "later version"},
         {"query potter --points - --nearest --field", "leave it out"},
         {"query potter --points - --nearest --rays", "leave it out"},
-        {"bench feild", "--list"},
+        {"bench feild", "did you mean \"field\"?"},
+        {"bench field/rais", "did you mean \"field/rays\"?"},
+        {"bench juggling", "`kiln bench --list` names them"},
         {"bench field --kind 3", "there is no kind 3"},
-        {"bench field --count 0", "between 1 and 1000000"},
+        {"bench field --count 0", "--count: Value 0 not in range 1 to 1000000"},
+        {"bench field --count -1", "--count: Value -1 not in range 1 to 1000000"},
+        {"bench field --count 99999999999", "--count: Value 99999999999 not in range 1 to 1000000"},
+        {"bench field --seed -1", "--seed = -1: not a value that it takes"},
         {"bench field --threads 0", "--threads"},
     };
     for (const auto& [words, says] : cases) {

@@ -96,6 +96,7 @@ TEST_F(ReadFile, WhatIsNoModelSaysWhatWouldBe) {
         EXPECT_EQ(mesh.error().kind, ErrorKind::Input);
         EXPECT_THAT(mesh.error().message, StartsWith(path + ":"));
         EXPECT_THAT(mesh.error().message, HasSubstr(";")) << "a mend";
+        EXPECT_THAT(mesh.error().message, Not(HasSubstr(":0"))) << "lines count from 1";
     }
 }
 
