@@ -161,6 +161,9 @@ Result<void> Player::open() {
     auto session = Session::open(o_.scene, o_.backend);
     if (!session) return session.error();
     session_ = std::move(*session);
+    for (const std::string& file : {o_.screenshot, o_.ui_json})
+        if (!file.empty() && session_->world().is_read_from(file))
+            return Error{file + ": the scene is read from it; choose another name", ErrorKind::Usage};
     auto camera = session_->world().camera(o_.camera);
     if (!camera) return camera.error();
     camera_.emplace(*camera);

@@ -464,6 +464,13 @@ Result<void> World::flush() const {
     return impl_->journal->file.flush();
 }
 
+bool World::is_read_from(const std::string& file) const {
+    if (scene::is_bundled(impl_->data)) return false;
+    std::vector<std::string> files = scene::files_named(to_json(), impl_->data.folder);
+    if (!impl_->data.source.empty()) files.emplace_back(impl_->data.source.name());
+    return std::ranges::any_of(files, [&](const std::string& read) { return scene::same_file(read, file); });
+}
+
 std::optional<JournalReport> World::journal_report() const { return impl_->report; }
 
 std::string JournalReport::sentence() const {

@@ -166,6 +166,35 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
     EXPECT_THAT(files(), testing::ElementsAre("tet.kiln.json", "tet.obj"));
 }
 
+// Results are written over, as compilers do; a scene is not, and never what is read.
+TEST_F(Cli, NothingIsWrittenOverThatSomebodyMadeOrThatIsRead) {
+    const std::string tet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    write("tet.obj", tet);
+    ASSERT_EQ(run("import tet.obj -o tet.kiln.json --resolution 8").code, 0);
+    const std::string scene = read(folder_ / "tet.kiln.json");
+    std::filesystem::create_symlink("tet.obj", folder_ / "link.obj");
+    for (const char* words : {"export tet.kiln.json -o tet.obj", "export tet.kiln.json -o ./link.obj",
+                              "simulate tet.kiln.json --seconds 0.1 --keep tet.kiln.json --force",
+                              "view tet.kiln.json --frames 1 --ui-json tet.kiln.json"}) {
+        const Outcome o = run(words);
+        EXPECT_EQ(o.code, 2) << words << o.err;
+        EXPECT_THAT(o.err, HasSubstr("the scene is read from it; choose another name")) << words;
+        expect_one_line(o, words);
+    }
+    write("kept.kiln.json", "somebody's");
+    const Outcome kept = run("simulate tet.kiln.json --seconds 0.1 --keep kept.kiln.json");
+    EXPECT_EQ(kept.code, 1);
+    EXPECT_THAT(kept.err, HasSubstr("kept.kiln.json: is there already; choose another name, or add --force"));
+    EXPECT_EQ(read(folder_ / "kept.kiln.json"), "somebody's");
+    EXPECT_EQ(run("simulate tet.kiln.json --seconds 0.1 --keep kept.kiln.json --force").code, 0);
+    EXPECT_NE(read(folder_ / "kept.kiln.json"), "somebody's");
+    write("out.obj", "old");
+    EXPECT_EQ(run("export tet.kiln.json -o out.obj").code, 0);
+    EXPECT_NE(read(folder_ / "out.obj"), "old");
+    EXPECT_EQ(read(folder_ / "tet.obj"), tet);
+    EXPECT_EQ(read(folder_ / "tet.kiln.json"), scene);
+}
+
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
     for (const char* verb : {"", "demo", "view", "render", "query", "import", "export", "inspect", "validate", "schema",
                              "doctor", "compare", "diff", "new", "bench"}) {
