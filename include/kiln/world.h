@@ -174,7 +174,8 @@ public:
     Result<void> move(EditId id, const Pose& pose);
     /// Where that is now; nothing for other edits.
     std::optional<Pose> pose(EditId id) const;
-    /// A change as data, {"add": EDIT} and the like; `name` is what errors call the text.
+    /// A change as data, {"add": EDIT} and the like (docs/journal.md lists them); `name` is what errors call the text. Sections that have no
+    /// functions here come this way or with a scene's text: {"bodies": […]}, {"meshes": […]}, {"characters": […]}.
     Result<void> apply(const std::string& command, const std::string& name = "command");
     Result<void> apply(const TimedCommand& command);
     /// Changes from the first call on can be undone.
@@ -261,6 +262,21 @@ struct PlayHit {
     std::string body{};  ///< id of the body it belongs to; empty: of none
 };
 
+/// A body of a play: one of the scene, a part that came loose, or one that was launched.
+struct PlayBody {
+    std::string id;
+    Pose pose{};                                 ///< of its frame, after the last step: its first edit's, or its mesh's
+    vec3 linear_velocity{}, angular_velocity{};  ///< m/s, of its centre of mass; rad/s
+    bool asleep = false;                         ///< or come to rest for good, as ground
+};
+
+/// Something that a step of a play brought about.
+struct PlayEvent {
+    std::string_view
+        type;  ///< "begin", "end": a and b touch, or do so no more; "enter", "leave": b and the region of trigger a
+    std::string a, b;  ///< ids, of a contact in either order; the world's own edits are "world"
+};
+
 /// Who walks in a play (Play::enter).
 struct PlayWalker {
     vec3 feet{};  ///< as far between the last two steps as frames are
@@ -306,8 +322,12 @@ public:
     /// has gone on. Each frame moves on from the one before (motion).
     /// `budget`: of a world of several levels, what the picture may bake.
     Result<Frame> frame(const Camera& camera, const PlayLines& lines = {}, const FrameBudget& budget = {});
+    /// Where everything is that moves or could: the scene's bodies in its order, then the others as they came.
+    std::vector<PlayBody> bodies() const;
+    /// What came about in the last step() or advance(), in order.
+    const std::vector<PlayEvent>& events() const { return events_; }
     /// A new body of one edit, which goes off at `velocity` (m/s) with the next step. It is like a part that came loose: it settles, and
-    /// keep() has it. Its name is made up.
+    /// keep() has it. Its id is made up; it is the last of bodies() then.
     Result<void> launch(Edit edit, vec3 velocity);
     /// What a ray meets of the world as the last frame showed it, bodies among it.
     Result<RayHit> cast(const Ray& ray);
@@ -326,6 +346,8 @@ private:
     friend class World;
     explicit Play(std::unique_ptr<scene::Simulation> simulation);
     std::unique_ptr<scene::Simulation> simulation_;
+    Result<void> make_step();
+    std::vector<PlayEvent> events_;
     double ahead_ = 0, dropped_ = 0;  // seconds
     float between_ = 1;               // the step before … the last one
     struct Session;

@@ -195,6 +195,18 @@ TEST_F(Cli, NothingIsWrittenOverThatSomebodyMadeOrThatIsRead) {
     EXPECT_EQ(read(folder_ / "tet.kiln.json"), scene);
 }
 
+// The game without a window, as somebody would try it.
+TEST_F(Cli, TheSampleOfAPlayTellsWhatTheBallHitsAndWhatFalls) {
+    const std::string program = std::filesystem::path(KILN_PROGRAM).parent_path() / "sample_play";
+    const int status = std::system(("'" + program + "' > '" + (folder_ / "said").string() + "'").c_str());
+    EXPECT_EQ(status, 0);
+    const std::string said = read(folder_ / "said");
+    EXPECT_THAT(said, testing::ContainsRegex("s: (can1 meets thrown1|thrown1 meets can1)"));
+    EXPECT_THAT(said, testing::Not(HasSubstr("world")));
+    EXPECT_THAT(said, testing::ContainsRegex("\n[123] of 3 fell"));
+    std::filesystem::remove(folder_ / "said");
+}
+
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {
     for (const char* verb : {"", "demo", "view", "render", "query", "import", "export", "inspect", "validate", "schema",
                              "doctor", "compare", "diff", "new", "bench"}) {
