@@ -204,6 +204,8 @@ TEST(Play, BodiesAndEventsAreThoseThatSimulateTells) {
         ASSERT_TRUE(other.launch(ball, {0, 1, 0}));
         EXPECT_EQ(other.bodies().size(), 3u);
         EXPECT_EQ(other.bodies().back().pose.position, (vec3{3, 5, 0}));
+        for (int i = 0; i < 300 && other.events().empty(); ++i) ASSERT_TRUE(other.step());
+        ASSERT_FALSE(other.events().empty()) << "it falls on the ground";
         ASSERT_TRUE(other.restart());
         EXPECT_TRUE(other.events().empty());
         EXPECT_EQ(other.bodies().size(), 2u);
