@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
 
 namespace kiln::model {
 namespace {
@@ -27,6 +28,12 @@ bool keep_bytes(tinygltf::Image* image, const int number, std::string* error, st
     }
     image->image.assign(bytes, bytes + std::max(size, 0));
     return true;
+}
+
+// A buffer is a file: reading a folder as one asks for all memory, and a pipe may never answer.
+bool is_file(const std::string& path, void*) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
 }
 
 // tinygltf goes into what is nested by calling itself, as deep as a file says: 200,000 brackets end the program.
@@ -84,6 +91,12 @@ Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& nam
         tinygltf::Model model;
         tinygltf::TinyGLTF loader;
         loader.SetImageLoader(keep_bytes, &model);
+        tinygltf::FsCallbacks files{};
+        files.FileExists = is_file;
+        files.ExpandFilePath = tinygltf::ExpandFilePath;
+        files.ReadWholeFile = tinygltf::ReadWholeFile;
+        files.WriteWholeFile = tinygltf::WriteWholeFile;
+        loader.SetFsCallbacks(files);
         std::string why, warning;
         if (bytes.size() > (size_t(1) << 31))
             return Error{name + ": larger than 2 GiB; split the model", ErrorKind::Input};

@@ -14,6 +14,8 @@
 #include <fstream>
 #include <random>
 
+#include <sys/stat.h>
+
 namespace kiln::model {
 namespace {
 
@@ -83,6 +85,14 @@ TEST_F(ReadFile, BuffersBesideAGltfAreFound) {
     const auto lost = read(write("lost.gltf", gltf_json("gone.bin")));
     ASSERT_FALSE(lost);
     EXPECT_THAT(lost.error().message, StartsWith(path_ + "lost.gltf: "));
+    // What is no file has no bytes to wait for.
+    ASSERT_EQ(::mkfifo((path_ + "pipe.bin").c_str(), 0600), 0);
+    std::filesystem::create_directory(path_ + "folder.bin");
+    for (const char* name : {"pipe.bin", "folder.bin"}) {
+        const auto other = read(write("other.gltf", gltf_json(name)));
+        ASSERT_FALSE(other);
+        EXPECT_THAT(other.error().message, HasSubstr(std::string("not found : ") + name));
+    }
 }
 
 TEST_F(ReadFile, WhatIsNoModelSaysWhatWouldBe) {
