@@ -217,6 +217,16 @@ TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
     EXPECT_EQ(uint8_t(png[23]), 20);
 }
 
+TEST_F(View, GpuAMessageIsSeenForThreeSeconds) {
+    write("v.jsonl", "{\"frame\": 1, \"key\": \"v\", \"down\": true}\n");
+    const Outcome o = run("view pillar.kiln.json --size 16x9 --frames 190 --keys v.jsonl --ui-json a.jsonl");
+    ASSERT_EQ(o.code, 0) << o.err;
+    std::istringstream in(read("a.jsonl"));
+    std::string line;
+    for (int i = 0; std::getline(in, line); ++i)
+        EXPECT_EQ(line.find("\"message\"") != std::string::npos, i >= 1 && i <= 180) << i;
+}
+
 TEST_F(View, GpuWalksJumpsLooksAndDigsWhereTheCrossIs) {
     write("walk.jsonl", R"({"frame": 0, "mouse": [1, 1]}
 {"frame": 1, "key": "f", "down": true}
