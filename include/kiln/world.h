@@ -270,10 +270,10 @@ struct PlayBody {
     bool asleep = false;                         ///< or come to rest for good, as ground
 };
 
-/// Something that a step of a play brought about.
+/// Something that a step of a play brought about: "begin", "end": a and b touch, or do so no more; "enter", "leave": b is in the region of
+/// trigger a, or no more.
 struct PlayEvent {
-    std::string_view
-        type;  ///< "begin", "end": a and b touch, or do so no more; "enter", "leave": b and the region of trigger a
+    std::string_view type;
     std::string a, b;  ///< ids, of a contact in either order; the world's own edits are "world"
 };
 

@@ -465,7 +465,8 @@ Result<void> World::flush() const {
 }
 
 bool World::is_read_from(const std::string& file) const {
-    if (scene::is_bundled(impl_->data)) return false;
+    struct stat info {};
+    if (scene::is_bundled(impl_->data) || ::stat(file.c_str(), &info) != 0) return false;
     std::vector<std::string> files = scene::files_named(to_json(), impl_->data.folder);
     if (!impl_->data.source.empty()) files.emplace_back(impl_->data.source.name());
     return std::ranges::any_of(files, [&](const std::string& read) { return scene::same_file(read, file); });
