@@ -164,7 +164,7 @@ endfunction()
 
 # Of the scene module what reads files, which is all of it that fuzz targets link: clang 14 knows no parenthesised initialisation of
 # aggregates, which the texts shared with shaders use.
-set(KILN_READERS command format heights_png json_print json_source read_bodies read_nodes read_values scene_file scene_writer suggest)
+set(KILN_READERS command format heights_png json_print json_source read_bodies read_nodes read_values scene_file scene_writer)
 
 # tests/fuzz/X_fuzzer.cpp -> bin/fuzz_X, of libFuzzer (preset fuzz).
 function(kiln_fuzzers)

@@ -157,7 +157,8 @@ void add_bench(CLI::App& app, Run& run) {
             ->delimiter(',');
     CLI::Option* seed = verb->add_option("--seed", o->bench.seed, "of the scene (default 5)");
     verb->add_option("--runs", o->bench.runs, "a row is the least of so many (default 7)");
-    CLI::Option* count = verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)");
+    CLI::Option* count = verb->add_option("--count", o->bench.count, "edits of the scene (default 1000)")
+                             ->check(CLI::Range(uint32_t{1}, kMostBenchEdits));
     verb->add_option(
             "--scene", o->bench.scene,
             "a scene file or a bundled scene's name, for the rows of field but edits, in place of kind, seed and "

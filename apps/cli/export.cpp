@@ -101,6 +101,8 @@ int export_mesh(const Options& o) {
     progress.stage("loading " + o.scene);
     const auto world = World::load(o.scene);
     if (!world) return progress.stage(""), fail(world.error());
+    if (!piped)
+        if (auto ok = not_read(*world, o.output); !ok) return progress.stage(""), fail(ok.error());
     progress.stage("meshing");
     const Stopwatch meshing;
     const auto mesh = world->mesh(*settings);
@@ -166,7 +168,9 @@ void add_export(CLI::App& app, Run& run) {
                            "  kiln export my.kiln.json -o part.stl --sharp --cell 2mm\n"
                            "  kiln export quarry -o - --format ply --simplify 0.1 > quarry.ply");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
-    verb->add_option("-o,--output", o->output, "mesh to write: .glb, .obj, .stl or .ply; - for a pipe")->required();
+    verb->add_option("-o,--output", o->output,
+                     "mesh to write (over what is there): .glb, .obj, .stl or .ply; - for a pipe")
+        ->required();
     verb->add_option("--format", o->format, "glb, obj, stl or ply, where -o is -");
     verb->add_option("--cell", o->cell, "metres between samples (or 5mm, 1cm); left out: the scene's voxel size");
     verb->add_flag("--sharp", o->sharp, "keep edges and corners of shapes");

@@ -9,7 +9,6 @@
 
 #include <array>
 #include <memory>
-#include <sys/stat.h>
 
 namespace kiln::cli {
 
@@ -38,13 +37,9 @@ int run_import(const Options& o) {
     if (o.up != "y" && o.up != "z") return usage("--up " + o.up + ": not an axis; write y or z");
     if (o.resolution < 8 || o.resolution > 512)
         return usage("--resolution " + std::to_string(o.resolution) + ": must be between 8 and 512");
-    if (auto ok = writable_scene(o.output); !ok) return fail(ok.error());
+    if (auto ok = writable_scene(o.output, o.force); !ok) return fail(ok.error());
     settings.z_up = o.up == "z";
     settings.resolution = o.resolution;
-    struct stat info {};
-    if (!o.force && ::stat(o.output.c_str(), &info) == 0)
-        return fail(Error{o.output + ": is there already; choose another name, or add --force to write over it",
-                          ErrorKind::Failed});
     Progress progress;
     progress.stage("reading " + o.model);
     const auto world = World::import(o.model, o.output, settings);

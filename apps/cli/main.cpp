@@ -98,6 +98,8 @@ int run(int argc, char** argv) {
         std::string message = e.what();
         for (char& c : message)
             if (c == '\n') c = ' ';
+        if (constexpr std::string_view kConvert = "Could not convert: "; message.starts_with(kConvert))
+            message = message.substr(kConvert.size()) + ": not a value that it takes";
         say(name + ": " + message + "; `" + name + " --help` shows how it is used");
         return kUsage;
     }

@@ -7,7 +7,6 @@
 #include "cli/verbs.h"
 
 #include <memory>
-#include <unistd.h>
 
 namespace kiln::cli {
 
@@ -34,10 +33,7 @@ constexpr std::string_view kFirst = R"({
 )";
 
 int make(const Options& o) {
-    if (auto ok = writable_scene(o.scene); !ok) return fail(ok.error());
-    for (const std::string& file : {o.scene, o.scene + ".journal"})
-        if (!o.force && ::access(file.c_str(), F_OK) == 0)
-            return fail({file + ": is there already; --force writes over it", ErrorKind::Failed});
+    if (auto ok = writable_scene(o.scene, o.force); !ok) return fail(ok.error());
     auto world = o.from.empty() ? World::parse(kFirst, o.scene) : load_scene(o.from);
     if (!world) return fail(world.error());
     if (auto saved = world->save(o.scene); !saved) return fail(saved.error());

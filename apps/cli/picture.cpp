@@ -356,6 +356,7 @@ int render_picture(const PictureOptions& o) {
     progress.stage("loading " + o.scene);
     auto world = World::load(o.scene);
     if (!world) return progress.stage(""), fail(world.error());
+    if (auto ok = not_read(*world, o.output); !ok) return progress.stage(""), fail(ok.error());
     if (!o.path.empty()) return render_sequence(o, *settings, *world, progress);
     progress.stage("finding the surface");
     auto frame = world->frame(o.camera);

@@ -16,7 +16,7 @@ void add_render(CLI::App& app, Run& run) {
                                         "Examples:\n"
                                         "  kiln render archipelago -o fly.png --size 640x480 --path all --frames 240");
     verb->add_option("SCENE", o->scene, "a scene file, or a bundled scene's name")->required();
-    verb->add_option("-o,--output", o->output, "picture to write: .png or .exr")->required();
+    verb->add_option("-o,--output", o->output, "picture to write (over what is there): .png or .exr")->required();
     verb->add_option("--size", o->size, "WIDTHxHEIGHT in pixels")->capture_default_str();
     verb->add_option("--camera", o->camera, "a camera's name; left out: the scene's first");
     verb->add_option("--view", o->view, "shaded, albedo, normal, depth, steps, bricks, levels or ao")

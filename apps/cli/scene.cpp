@@ -4,6 +4,8 @@
 
 #include "cli/talk.h"
 
+#include <filesystem>
+
 namespace kiln::cli {
 
 void tell_journal(const World& world) {
@@ -25,9 +27,19 @@ void add_journal(Json& json, const World& world) {
     json.raw("journal", one.object());
 }
 
-Result<void> writable_scene(const std::string& path) {
+Result<void> writable_scene(const std::string& path, bool force) {
     if (!path.ends_with(".kiln.json")) return Error{path + ": a scene's name ends in .kiln.json", ErrorKind::Usage};
+    std::error_code ignored;
+    for (const std::string& file : {path, path + ".journal"})
+        if (!force && std::filesystem::exists(file, ignored))
+            return Error{file + ": is there already; choose another name, or add --force to write over it",
+                         ErrorKind::Failed};
     return writable(path);
+}
+
+Result<void> not_read(const World& world, const std::string& output) {
+    if (!world.is_read_from(output)) return {};
+    return Error{output + ": the scene is read from it; choose another name", ErrorKind::Usage};
 }
 
 }  // namespace kiln::cli

@@ -14,8 +14,11 @@ namespace kiln::cli {
 void tell_journal(const World& world);
 /// World::load(), told.
 Result<World> load_scene(const std::string& path_or_name);
-/// Why no scene can be written there: its name does not end in .kiln.json, or the file cannot be made. Known before any work is done.
-Result<void> writable_scene(const std::string& path);
+/// Why no scene can be written there: its name does not end in .kiln.json, a file is there (unless `force`), or none can be made. Known
+/// before any work is done. Results are written over unasked, as compilers do; scenes are what people make.
+Result<void> writable_scene(const std::string& path, bool force);
+/// Why a result cannot be written there: the scene is read from it.
+Result<void> not_read(const World& world, const std::string& output);
 /// "journal": {…} where there is one to tell of.
 void add_journal(Json& json, const World& world);
 

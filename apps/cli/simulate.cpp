@@ -24,7 +24,7 @@ struct Options {
     std::string out, keep;
     PictureOptions pictures;
     bool png = false;
-    bool json = false;
+    bool json = false, force = false;
 };
 
 int simulate(const Options& o) {
@@ -34,7 +34,8 @@ int simulate(const Options& o) {
         if (section != "meshes" && section != "triggers" && section != "characters")
             say("kiln simulate: " + o.scene + ": this version does not simulate \"" + section + "\"");
     if (!o.keep.empty()) {
-        if (auto ok = writable_scene(o.keep); !ok) return fail(ok.error());
+        if (auto ok = writable_scene(o.keep, o.force); !ok) return fail(ok.error());
+        if (auto ok = not_read(*world, o.keep); !ok) return fail(ok.error());
     }
     SimulateSettings settings = o.settings;
     if (!o.edits.empty()) {
@@ -117,6 +118,7 @@ void add_simulate(CLI::App& app, Run& run) {
     verb->add_option(
         "--keep", o->keep,
         "scene file to write, NAME.kiln.json: what the scene is at the end, bodies and parts where they are");
+    verb->add_flag("--force", o->force, "writes over a scene that is there");
     verb->add_option("--threads", o->settings.threads, "left out: all cores");
     verb->add_option("--out", o->out, "folder, which must be there, for --png");
     CLI::Option* png = verb->add_flag("--png", o->png, "a picture of each frame: frame_00000.png and so on");

@@ -20,6 +20,24 @@ constexpr std::string_view kWalkHints[] = {"WASD walks", "mouse looks", "left mo
                                            "H all keys", "P pauses"};
 constexpr std::string_view kBetween = " \xc2\xb7 ";
 
+// Broken at spaces to lines of so many pixels; a word that is wider has a line of its own.
+std::vector<std::string> lines_within(const Canvas& canvas, std::string_view text, int width) {
+    std::vector<std::string> out(1);
+    while (!text.empty()) {
+        const size_t end = std::min(text.find(' '), text.size());
+        const std::string word(text.substr(0, end));
+        text.remove_prefix(std::min(end + 1, text.size()));
+        std::string& line = out.back();
+        if (line.empty())
+            line = word;
+        else if (canvas.text_width(line + " " + word) <= width)
+            line += " " + word;
+        else
+            out.push_back(word);
+    }
+    return out;
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
@@ -44,9 +62,14 @@ std::vector<std::pair<std::string, Rect>> Hud::draw(Picture& picture) const {
         bottom = bar.y;
     }
     if (!message.empty()) {
-        const Rect bar{0, bottom - tall, std::min(picture.width, canvas.text_width(message) + 2 * pad), tall};
+        const auto lines = lines_within(canvas, message, picture.width - 2 * pad);
+        int wide = 0;
+        for (const std::string& line : lines) wide = std::max(wide, canvas.text_width(line));
+        const int high = int(lines.size()) * canvas.line_height() + pad;
+        const Rect bar{0, bottom - high, std::min(picture.width, wide + 2 * pad), high};
         canvas.fill(bar, 12, 12, 14, 0.6f);
-        canvas.text(pad, bar.y + pad, message, 255, 214, 140);
+        for (size_t i = 0; i < lines.size(); ++i)
+            canvas.text(pad, bar.y + pad + int(i) * canvas.line_height(), lines[i], 255, 214, 140);
         out.emplace_back("message", bar);
     }
     if (walks) {

@@ -29,7 +29,9 @@ constexpr double kLongestFrame = 0.1;   // what is longer is a stop, not a fast 
 constexpr double kCatchUp = 0.03;       // seconds a frame to run a play again
 constexpr double kBakeSeconds = 0.008;  // a frame, of worlds of several levels
 constexpr uint32_t kBakeBricks = 512;   // likewise, where no clock is asked
-constexpr int kMessageFrames = 180;
+constexpr double kMessageSeconds = 3;
+constexpr double kLookAtFile = 1;  // seconds from one look at the scene file to the next
+constexpr int kFramesALook = 60;   // likewise, where no clock is asked
 constexpr int kFramesToRest =
     80;  // a round of the places in a pixel that rays go through, with a fourth as many of them
 constexpr float kBiteOfDistance = 0.03f;  // radius: as large on the screen from everywhere
@@ -97,6 +99,7 @@ private:
     void fly(float seconds);
     void walk();
     Result<void> start_or_stop_walking();
+    void look_at_file();
     bool walks() const { return hud_.walks; }
     void hold_mouse() {
         if (window_ && o_.keys.empty()) window_->hold_mouse(walks() || input_.button("right"));
@@ -112,7 +115,7 @@ private:
     std::string ui_line(const std::vector<std::pair<std::string, Rect>>& widgets);
     void message(const std::string& text) {
         hud_.message = text;
-        message_until_ = frame_ + kMessageFrames;
+        message_left_ = kMessageSeconds;
     }
     // Of things that a person asked for and that did not work: said on the screen, and the world goes on.
     void tell(const Result<void>& done) {
@@ -121,7 +124,7 @@ private:
     // Nothing will look other than it does: time stands still, and the last picture is as good as it gets.
     bool rests() const {
         return paused_ && o_.keys.empty() && input_.keys.empty() && input_.buttons.empty() && session_->behind() == 0 &&
-               frame_ > last_input_ + kFramesToRest && frame_ > message_until_;
+               frame_ > last_input_ + kFramesToRest && message_left_ <= 0;
     }
     bool replays() const { return !o_.keys.empty() || !window_; }
 
@@ -137,11 +140,13 @@ private:
     PlayLines lines_;
     View view_ = View::Shaded;
     int width_ = 0, height_ = 0;
-    int frame_ = 0, message_until_ = 0, last_bite_ = 0, last_input_ = 0;
+    int frame_ = 0, last_bite_ = 0, last_input_ = 0;
     vec3 bite_towards_{};
     float speed_ = 4;  // m/s
     vec3 walk_{};      // m/s, wished
     bool paused_ = false, profiler_ = false, done_ = false;
+    double message_left_ = 0;                                         // seconds
+    double looked_ = 0;                                               // seconds since the scene file was looked at
     double frame_seconds_ = 0, work_seconds_ = 0, rung_seconds_ = 0;  // smoothed; work: without waiting for the screen
     size_t rung_ = 0;
     int rung_since_ = 0;  // frame
@@ -157,6 +162,9 @@ Result<void> Player::open() {
     auto session = Session::open(o_.scene, o_.backend);
     if (!session) return session.error();
     session_ = std::move(*session);
+    for (const std::string& file : {o_.screenshot, o_.ui_json})
+        if (!file.empty() && session_->world().is_read_from(file))
+            return Error{file + ": the scene is read from it; choose another name", ErrorKind::Usage};
     auto camera = session_->world().camera(o_.camera);
     if (!camera) return camera.error();
     camera_.emplace(*camera);
@@ -359,6 +367,23 @@ Result<void> Player::start_or_stop_walking() {
     return {};
 }
 
+// Other programs may write the scene, too.
+void Player::look_at_file() {
+    const std::string before = session_->warning();
+    if (session_->look_at_file()) {
+        const std::string news = session_->file() + " was changed by another program and is loaded again";
+        message(news);
+        o_.say(news);
+        if (!session_->note().empty()) o_.say(session_->note());
+        hud_.walks = session_->walker().has_value();
+        last_input_ = frame_;
+    } else if (session_->warning() != before) {
+        if (!session_->warning().empty()) o_.say(session_->warning());
+        last_input_ = frame_;
+        message_left_ = 0;  // seen at once
+    }
+}
+
 Result<void> Player::use_tools() {
     const bool digs = input_.button("left"), adds = input_.button("middle") || input_.key("b");
     if (!digs && !adds) return session_->end_stroke();
@@ -446,7 +471,13 @@ Result<void> Player::run() {
         const Clock::time_point start = Clock::now();
         const double real = std::chrono::duration<double>(start - std::exchange(before, start)).count();
         const double seconds = replays() ? kReplayStep : std::min(real, kLongestFrame);
+        message_left_ -= replays() ? kReplayStep : real;
         if (auto taken = take_events(); !taken) return taken;
+        looked_ += replays() ? kLookAtFile / kFramesALook : real;
+        if (looked_ >= kLookAtFile) {
+            look_at_file();
+            looked_ = 0;
+        }
         fly(float(seconds));
         if (auto used = use_tools(); !used) return used;
         const double budget = replays() ? std::numeric_limits<double>::infinity() : kCatchUp;
@@ -463,7 +494,7 @@ Result<void> Player::run() {
         if (!hidden) {
             auto picture = draw(seconds);
             if (!picture) return picture.error();
-            if (frame_ >= message_until_) hud_.message.clear();
+            if (message_left_ <= 0) hud_.message = session_->warning();
             describe(renderer_->stats());
             widgets = hud_.draw(*picture);
             last = std::move(*picture);

@@ -27,7 +27,10 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
     const bool is_bundled = is_bundled_scene(scene);
     out->file_ = is_bundled ? scene + ".kiln.json" : scene;
     Result<World> world = Error{};
+    std::error_code code;
     if (!is_bundled) {
+        // Before it is read: what comes between the two is a change.
+        if (std::filesystem::is_regular_file(scene, code)) out->watch_.emplace(scene);
         world = World::open(scene);
         out->journaled_ = bool(world);
         out->own_file_ = out->journaled_;
@@ -39,7 +42,11 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
         if (!world) return world.error();
     }
     out->world_ = std::make_unique<World>(std::move(*world));
-    if (const auto report = out->world_->journal_report()) out->note_ = report->sentence();
+    out->is_saved();
+    if (const auto report = out->world_->journal_report()) {
+        out->note_ = report->sentence();
+        if (out->journaled_ && report->commands > 0) out->saved_.reset();
+    }
     auto base = World::load(scene);
     if (!base) return base.error();
     out->base_ = std::make_unique<World>(std::move(*base));
@@ -160,7 +167,6 @@ Result<void> Session::dig(vec3 at, float radius, bool add, const std::string& bo
             return applied;
         }
         hash_.reset();
-        dirty_ = true;
     }
     stroke_->told.push_back(std::move(told));
     return {};
@@ -221,7 +227,6 @@ Result<bool> Session::undo() {
     if (auto gone = world_->history().go_to(a.before); !gone) return gone.error();
     --done_;
     hash_.reset();
-    dirty_ = true;
     if (a.kind != Action::Kind::Keep && !fill_in(a))
         if (auto run = run_again(wanted_); !run) return run.error();
     return true;
@@ -244,7 +249,6 @@ Result<bool> Session::redo() {
     if (auto gone = world_->history().go_to(a.after); !gone) return gone.error();
     ++done_;
     hash_.reset();
-    dirty_ = true;
     const auto made = behind() > 0 ? run_again(std::max(wanted_, a.told.empty() ? 0 : a.told.front().at)) : perform(a);
     if (!made) return made.error();
     return true;
@@ -282,9 +286,72 @@ Result<void> Session::keep() {
     }
     a.after = history.now();
     hash_.reset();
-    dirty_ = true;
     add(std::move(a));
     return {};
+}
+
+bool Session::dirty() const {
+    const bool digs =
+        stroke_ && std::any_of(stroke_->told.begin(), stroke_->told.end(), [](const Told& t) { return t.of_world; });
+    return digs || world_->history().now() != saved_;
+}
+
+Result<void> Session::reload() {
+    const std::string text = text_of(file_);
+    std::unique_ptr<Session> next(new Session);
+    next->scene_ = next->file_ = file_;
+    next->backend_ = backend_;
+    next->watch_ = watch_;
+    next->watch_->know(hash_of(text));
+    for (auto* const world : {&next->world_, &next->base_}) {
+        auto parsed = World::parse(text, file_);
+        if (!parsed) return parsed.error();
+        *world = std::make_unique<World>(std::move(*parsed));
+    }
+    if (auto started = next->start(); !started) return started;
+    const auto who = walker();
+    world_.reset();  // lets go of the journal
+    if (auto opened = World::open(file_)) {
+        *next->world_ = std::move(*opened);
+        next->journaled_ = next->own_file_ = true;
+        if (const auto report = next->world_->journal_report()) next->note_ = report->sentence();
+    } else {
+        next->note_ = opened.error().message + "; what is changed is kept only by saving";
+    }
+    next->first_ = next->world_->history().now();
+    next->is_saved();
+    if (who) (void)next->enter(who->feet);
+    std::swap(*this, *next);
+    return {};
+}
+
+bool Session::look_at_file() {
+    if (!watch_) return false;
+    const auto name = [&] { return std::filesystem::path(file_).filename().string(); };
+    switch (watch_->look()) {
+    case WatchedFile::State::Same:
+        warning_.clear();
+        break;
+    case WatchedFile::State::Gone:
+        warning_ = name() + " is gone; Ctrl+S writes it again";
+        break;
+    case WatchedFile::State::Changed:
+        if (dirty()) {
+            tried_.reset();
+            warning_ = name() +
+                       " was changed by another program, and your changes are not saved: Ctrl+S writes yours and keeps "
+                       "the other's beside it; undoing all of yours loads the other's";
+            break;
+        }
+        if (tried_ == watch_->found()) break;
+        tried_ = watch_->found();
+        if (auto done = reload(); !done) {
+            warning_ = done.error().message;
+            break;
+        }
+        return true;
+    }
+    return false;
 }
 
 Result<std::string> Session::save() {
@@ -292,24 +359,41 @@ Result<std::string> Session::save() {
     std::error_code code;
     if (!own_file_ && std::filesystem::exists(file_, code))
         return Error{"save: " + file_ + " is there already; move it away, or play it with `kiln view " + file_ + "`"};
+    std::string said = file_;
+    if (watch_ && watch_->look() == WatchedFile::State::Changed) {
+        const std::string other = free_name_beside(file_, "other");
+        if (!std::filesystem::copy_file(file_, other, code))
+            return Error{"save: what another program wrote to " + file_ + " cannot be kept in " + other + ": " +
+                         code.message()};
+        said += "; what another program had written there is in " + other;
+    }
     if (auto saved = world_->save(file_); !saved) return saved.error();
     own_file_ = true;
-    dirty_ = false;
-    return file_;
+    is_saved();
+    watch_.emplace(file_);
+    warning_.clear();
+    return said;
 }
 
-std::string Session::farewell() const {
-    if (!dirty_) return {};
-    if (journaled_)
+std::string Session::farewell() {
+    if (!dirty()) return {};
+    if (!journaled_) return "what was changed in " + scene_ + " was not saved; Ctrl+S would have written " + file_;
+    const auto state = watch_ ? watch_->look() : WatchedFile::State::Same;
+    if (state == WatchedFile::State::Same)
         return file_ + " was not saved; its journal has what was changed, and the next start goes on from there";
-    return "what was changed in " + scene_ + " was not saved; Ctrl+S would have written " + file_;
+    const std::string found =
+        file_ + (state == WatchedFile::State::Gone
+                     ? " is gone"
+                     : " was changed by another program, and the next start opens it as it is there");
+    const std::string mine = free_name_beside(file_, "unsaved");
+    if (auto saved = world_->save(mine); !saved)
+        return found + "; what was changed here is in its journal only: " + saved.error().message;
+    return found + "; what was changed here is in " + mine;
 }
 
 uint64_t Session::world_hash() {
-    if (hash_) return *hash_;
-    uint64_t h = 0xcbf29ce484222325ull;  // FNV-1a, 64 bits
-    for (const char c : world_->to_json()) h = (h ^ uint8_t(c)) * 0x100000001b3ull;
-    return *(hash_ = h);
+    if (!hash_) hash_ = hash_of(world_->to_json());
+    return *hash_;
 }
 
 }  // namespace kiln::player

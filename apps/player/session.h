@@ -5,6 +5,8 @@
 // So undoing is exact in the world, and a play without what was undone is run again from the base, to where it was.
 #pragma once
 
+#include "player/watched_file.h"
+
 #include <kiln/world.h>
 
 #include <cstdint>
@@ -56,13 +58,20 @@ public:
     /// The world becomes what the play has made of it.
     Result<void> keep();
 
-    /// Says where it was written.
+    /// Says where it was written, and where what another program had written there is now.
     Result<std::string> save();
-    bool dirty() const { return dirty_; }
-    /// What to tell somebody who leaves; empty when nothing is lost or pending.
-    std::string farewell() const;
+    /// The world has changes that the scene file had not when it was last read or written here.
+    bool dirty() const;
+    /// Whether another program has written the scene file. Without changes of our own it is loaded again and the play begins anew (true).
+    /// With some, and where it cannot be loaded, all stays as it is and warning() says so, as long as that holds.
+    bool look_at_file();
+    const std::string& warning() const { return warning_; }
+    /// What to tell somebody who leaves; empty when nothing is lost or pending. Changes that the next start would not find, since another
+    /// program has written the scene file, are put beside it as a scene.
+    std::string farewell();
     /// What opening had to tell.
     const std::string& note() const { return note_; }
+    const std::string& file() const { return file_; }
     /// Of the world's text.
     uint64_t world_hash();
 
@@ -87,6 +96,10 @@ private:
 
     Session() = default;
     Result<void> start();
+    /// All of it from the scene file anew, with nothing undone to go back to. Fails before anything has changed.
+    Result<void> reload();
+    /// What the world is now is what its scene file has.
+    void is_saved() { saved_ = world_->history().now(); }
     /// Takes the digs of a stroke out of the play as it is; false where it cut something loose, or the play will not.
     bool fill_in(const Action& stroke);
     /// Makes an action that was undone again, now.
@@ -98,14 +111,17 @@ private:
     Told now(Told::What what) { return {.what = what, .at = steps_, .order = ++order_}; }
     void add(Action action);
 
-    std::string scene_, file_, backend_, note_;
-    bool journaled_ = false, dirty_ = false, own_file_ = false;
+    std::string scene_, file_, backend_, note_, warning_;
+    bool journaled_ = false, own_file_ = false;
+    std::optional<WatchedFile> watch_;  // of file_, once it is read or written here
+    std::optional<uint64_t> tried_;     // hash of what could not be loaded
     std::unique_ptr<World> world_, base_;
     std::optional<Play> play_;
     std::optional<Action> stroke_;
     std::vector<Action> actions_;
-    size_t done_ = 0;     // of actions_
-    uint32_t first_ = 0;  // step of the history that the base is
+    size_t done_ = 0;                // of actions_
+    uint32_t first_ = 0;             // step of the history that the base is
+    std::optional<uint32_t> saved_;  // … that the scene file is
     int64_t steps_ = 0, wanted_ = 0;
     std::vector<Told> walks_;  // of who walks, in order
     std::vector<Told> due_;    // that a play which is run again has still to be told, in order

@@ -24,11 +24,13 @@ struct BenchInfo {
 };
 std::vector<BenchInfo> bench_list();
 
+inline constexpr uint32_t kMostBenchEdits = 1000000;
+
 /// The scene family of `bench field` and how it is measured.
 struct BenchOptions {
     std::vector<int> kinds{0};  ///< 0: pebbles, 1: carve (three of ten edits subtract), 2: cluster
     uint32_t seed = 5;
-    uint32_t count = 1000;  ///< edits, 1 … 10⁶
+    uint32_t count = 1000;  ///< edits, 1 … kMostBenchEdits
     int threads = 0;        ///< 0: one thread, and rows for every core beside; otherwise just that many
     int runs = 7;           ///< a row is the least of so many, taken in turn with its peer's
     int resolution = 256;   ///< voxels along a side of [-1, 1]³

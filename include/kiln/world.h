@@ -174,7 +174,8 @@ public:
     Result<void> move(EditId id, const Pose& pose);
     /// Where that is now; nothing for other edits.
     std::optional<Pose> pose(EditId id) const;
-    /// A change as data, {"add": EDIT} and the like; `name` is what errors call the text.
+    /// A change as data, {"add": EDIT} and the like (docs/journal.md lists them); `name` is what errors call the text. Sections that have no
+    /// functions here come this way or with a scene's text: {"bodies": […]}, {"meshes": […]}, {"characters": […]}.
     Result<void> apply(const std::string& command, const std::string& name = "command");
     Result<void> apply(const TimedCommand& command);
     /// Changes from the first call on can be undone.
@@ -224,6 +225,8 @@ public:
     std::string history_json() const;
     /// What was found in the model files that the edits read, one sentence each: "bunny.obj: closed manifold of 69666 triangles".
     std::vector<std::string> model_notes() const;
+    /// Whether the scene is read from this file: its own, or one that it names (models, pictures, formulas). Write results elsewhere.
+    bool is_read_from(const std::string& file) const;
     /// Meshes that the scene names and that cannot be read, an error each: they are left out, the rest is drawn.
     std::vector<std::string> faults() const;
     /// Sections of the scene that this version reads and keeps but does not draw ("cloths", "fluids", …).
@@ -257,6 +260,21 @@ struct PlayCounts {
 struct PlayHit {
     RayHit hit;
     std::string body{};  ///< id of the body it belongs to; empty: of none
+};
+
+/// A body of a play: one of the scene, a part that came loose, or one that was launched.
+struct PlayBody {
+    std::string id;
+    Pose pose{};                                 ///< of its frame, after the last step: its first edit's, or its mesh's
+    vec3 linear_velocity{}, angular_velocity{};  ///< m/s, of its centre of mass; rad/s
+    bool asleep = false;                         ///< or come to rest for good, as ground
+};
+
+/// Something that a step of a play brought about: "begin", "end": a and b touch, or do so no more; "enter", "leave": b is in the region of
+/// trigger a, or no more.
+struct PlayEvent {
+    std::string_view type;
+    std::string a, b;  ///< ids, of a contact in either order; the world's own edits are "world"
 };
 
 /// Who walks in a play (Play::enter).
@@ -304,8 +322,12 @@ public:
     /// has gone on. Each frame moves on from the one before (motion).
     /// `budget`: of a world of several levels, what the picture may bake.
     Result<Frame> frame(const Camera& camera, const PlayLines& lines = {}, const FrameBudget& budget = {});
+    /// Where everything is that moves or could: the scene's bodies in its order, then the others as they came.
+    std::vector<PlayBody> bodies() const;
+    /// What came about in the last step() or advance(), in order.
+    const std::vector<PlayEvent>& events() const { return events_; }
     /// A new body of one edit, which goes off at `velocity` (m/s) with the next step. It is like a part that came loose: it settles, and
-    /// keep() has it. Its name is made up.
+    /// keep() has it. Its id is made up; it is the last of bodies() then.
     Result<void> launch(Edit edit, vec3 velocity);
     /// What a ray meets of the world as the last frame showed it, bodies among it.
     Result<RayHit> cast(const Ray& ray);
@@ -324,6 +346,8 @@ private:
     friend class World;
     explicit Play(std::unique_ptr<scene::Simulation> simulation);
     std::unique_ptr<scene::Simulation> simulation_;
+    Result<void> make_step();
+    std::vector<PlayEvent> events_;
     double ahead_ = 0, dropped_ = 0;  // seconds
     float between_ = 1;               // the step before … the last one
     struct Session;

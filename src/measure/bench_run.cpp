@@ -2,6 +2,7 @@
 #include "measure/bench_run.h"
 
 #include "base/parallel_for.h"
+#include "base/suggest.h"
 #include "sdf/eval.h"
 
 #include <algorithm>
@@ -45,8 +46,8 @@ std::optional<Error> fault_of(const BenchOptions& o) {
         if (kind < 0 || kind > 2)
             return usage(
                 formatted("bench: there is no kind {}; there are 0 (pebbles), 1 (carve) and 2 (cluster)", kind));
-    if (o.count < 1 || o.count > 1000000)
-        return usage(formatted("bench: {} edits; between 1 and 1000000 are possible", o.count));
+    if (o.count < 1 || o.count > kMostBenchEdits)
+        return usage(formatted("bench: {} edits; between 1 and {} are possible", o.count, kMostBenchEdits));
     if (o.threads < 0 || o.threads > 1024)
         return usage(formatted("bench: {} threads; between 1 and 1024 are possible", o.threads));
     if (o.runs < 1 || o.runs > 10000)
@@ -92,9 +93,17 @@ Result<BenchReport> run_bench(std::span<const std::string> names, const BenchOpt
     for (const std::string& name : names) {
         const bool known = std::ranges::any_of(
             families(), [&](const BenchFamily& family) { return name == family.info.name || rows.contains(name); });
-        if (!known)
-            return Error{formatted("there is no benchmark \"{}\"; `kiln bench --list` names them", name),
-                         ErrorKind::Usage};
+        if (known) continue;
+        std::vector<std::string> all;
+        for (const BenchFamily& family : families()) {
+            all.emplace_back(family.info.name);
+            for (const std::string_view row : family.info.rows)
+                all.push_back(all.back().substr(0, family.info.name.size()) + "/" + std::string(row));
+        }
+        const std::vector<std::string_view> words(all.begin(), all.end());
+        return Error{formatted("there is no benchmark \"{}\"; {}", name,
+                               suggestion(name, words, "`kiln bench --list` names them")),
+                     ErrorKind::Usage};
     }
     BenchReport report;
     report.machine = machine();

@@ -7,6 +7,7 @@
 
 #include "base/format.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -137,10 +138,13 @@ Result<Triangles> parse_gltf(std::string_view bytes, const std::string& name, co
     auto model = load_gltf(bytes, name, folder);
     if (!model) return model.error();
     for (const std::string& need : model->extensionsRequired) {
-        if (need == "KHR_draco_mesh_compression" || need == "EXT_meshopt_compression" ||
-            need == "KHR_mesh_quantization")
+        if (need.ends_with("_compression") || need == "KHR_mesh_quantization")
             return Error{formatted("{}: needs {}, which is not read; export it without compression", name, need),
                          ErrorKind::Input};
+        // Those are of looks, which a solid has none of.
+        constexpr std::string_view kOfLooks[] = {"KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_"};
+        if (std::ranges::none_of(kOfLooks, [&](std::string_view begin) { return need.starts_with(begin); }))
+            return Error{formatted("{}: needs {}, which is not read; export it without", name, need), ErrorKind::Input};
     }
     try {
         return Reader(*model, name).run();

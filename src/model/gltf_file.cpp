@@ -7,6 +7,8 @@
 #include "base/format.h"
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
 
 namespace kiln::model {
 namespace {
@@ -28,6 +30,52 @@ bool keep_bytes(tinygltf::Image* image, const int number, std::string* error, st
     return true;
 }
 
+// A buffer is a file: reading a folder as one asks for all memory, and a pipe may never answer.
+bool is_file(const std::string& path, void*) {
+    std::error_code ignored;
+    return std::filesystem::is_regular_file(path, ignored);
+}
+
+// tinygltf goes into what is nested by calling itself, as deep as a file says: 200,000 brackets end the program.
+constexpr size_t kMostNested = 512;
+
+// The text of a file, of a binary one too.
+std::string_view json_of(std::string_view bytes) {
+    constexpr size_t kBefore = 20;  // header of the file, length and type of the chunk
+    if (!bytes.starts_with("glTF")) return bytes;
+    if (bytes.size() < kBefore) return {};
+    uint32_t length = 0;
+    for (size_t i = 0; i < 4; ++i) length |= uint32_t(uint8_t(bytes[12 + i])) << (8 * i);
+    return bytes.substr(kBefore, length);
+}
+
+bool nested_too_deep(std::string_view json) {
+    size_t depth = 0;
+    bool quoted = false;
+    for (size_t i = 0; i < json.size(); ++i) {
+        const char c = json[i];
+        if (quoted) {
+            if (c == '\\') ++i;
+            quoted = c != '"';
+        } else if (c == '"') {
+            quoted = true;
+        } else if (c == '{' || c == '[') {
+            if (++depth > kMostNested) return true;
+        } else if ((c == '}' || c == ']') && depth > 0) {
+            --depth;
+        }
+    }
+    return false;
+}
+
+// What tinygltf says, which may quote all of a file.
+std::string said(std::string_view why) {
+    constexpr size_t kMost = 160;
+    std::string out = one_line(why.substr(0, kMost));
+    while (!out.empty() && (out.back() == ' ' || out.back() == '.')) out.pop_back();
+    return why.size() > kMost ? out + " ..." : out;
+}
+
 }  // namespace
 
 Error gltf_fault(const std::string& name, const std::string& what) {
@@ -36,28 +84,36 @@ Error gltf_fault(const std::string& name, const std::string& what) {
 
 Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& name, const std::string& folder) {
     const auto unreadable = [&](std::string_view why) {
-        return Error{formatted("{}: not a glTF file that can be read: {}; export it again", name, why),
+        return Error{formatted("{}: not a glTF file that can be read: {}; export it again", name, said(why)),
                      ErrorKind::Input};
     };
     try {
         tinygltf::Model model;
         tinygltf::TinyGLTF loader;
         loader.SetImageLoader(keep_bytes, &model);
+        tinygltf::FsCallbacks files{};
+        files.FileExists = is_file;
+        files.ExpandFilePath = tinygltf::ExpandFilePath;
+        files.ReadWholeFile = tinygltf::ReadWholeFile;
+        files.WriteWholeFile = tinygltf::WriteWholeFile;
+        loader.SetFsCallbacks(files);
         std::string why, warning;
         if (bytes.size() > (size_t(1) << 31))
             return Error{name + ": larger than 2 GiB; split the model", ErrorKind::Input};
+        if (nested_too_deep(json_of(bytes)))
+            return unreadable(formatted("something in it is nested more than {} deep", kMostNested));
         const auto size = unsigned(bytes.size());
         const bool read =
             bytes.starts_with("glTF")
                 ? loader.LoadBinaryFromMemory(&model, &why, &warning,
                                               reinterpret_cast<const unsigned char*>(bytes.data()), size, folder)
                 : loader.LoadASCIIFromString(&model, &why, &warning, bytes.data(), size, folder);
-        if (!read) return unreadable(one_line(why));
+        if (!read) return unreadable(why);
         return model;
     } catch (const std::bad_alloc&) {
         return Error{name + ": not enough memory for it; simplify the model", ErrorKind::OutOfMemory};
     } catch (const std::exception& e) {
-        return unreadable(one_line(e.what()));
+        return unreadable(e.what());
     }
 }
 

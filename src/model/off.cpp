@@ -6,12 +6,14 @@
 
 #include "base/format.h"
 
+#include <algorithm>
+
 namespace kiln::model {
 
 Result<Triangles> parse_off(std::string_view text, const std::string& name) {
     size_t number = 0;
     const auto fault = [&](const std::string& what) {
-        return Error{formatted("{}:{}: {}", name, number, what), ErrorKind::Input};
+        return Error{formatted("{}:{}: {}", name, std::max(number, size_t{1}), what), ErrorKind::Input};
     };
     // Lines with something in them, comments cut off.
     const auto line_with_words = [&](std::string_view& line) {

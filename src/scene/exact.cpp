@@ -196,7 +196,7 @@ public:
 
 private:
     static constexpr int kPatience = 16, kMostPatience = 64;  // steps before the next try
-    static constexpr double kWorth = 4;                      // steps that a leap must replace
+    static constexpr double kWorth = 4;                       // steps that a leap must replace
 
     bool free(double t, double length, double room, sdf::Regions::Cursor cursor) const {
         const double half = 0.5 * length;

@@ -131,7 +131,7 @@ constexpr KeyRow kMeshRows[] = {
     inside("outline", KeyType::Object, kOutlineTable, "a line around it on the screen"),
 };
 constexpr KeyRow kLightRows[] = {
-    needed(choice("type", kLights, "kind of light")),
+    needed(choice("type", kLights, "kind of light: directional, point or spot")),
     numbers("color", 3, KILN_AT(Light, color), {1, 1, 1}, "1", ">= 0", "linear; scales the light"),
     numbers("direction", 3, KILN_AT(Light, direction), {-0.4f, -1, -0.3f}, "1", "any",
             "where the light goes; any length above 0", kAimed),
@@ -245,8 +245,8 @@ constexpr KeyRow kFluidRows[] = {
     number("viscosity", kKept, 0.001f, "Pa s", ">= 0", "dynamic viscosity"),
     number("surface_tension", kKept, 0.07f, "N/m", ">= 0", "of its surface"),
     numbers("color", 3, kKept, {0.3f, 0.6f, 0.8f}, "1", "[0, 1]", "linear Rec. 709"),
-    plain("emitters", KeyType::List, "where particles come from"),
-    plain("drains", KeyType::List, "where particles go"),
+    plain("emitters", KeyType::List, "where particles come from: a list of anything, kept as it is"),
+    plain("drains", KeyType::List, "where particles go: a list of anything, kept as it is"),
 };
 constexpr KeyRow kSceneRows[] = {
     plain("$schema", KeyType::Text, "where the schema is, for text editors"),

@@ -2,6 +2,7 @@
 #include "scene/moved_files.h"
 
 #include "scene/json_source.h"
+#include "scene/region.h"
 
 #include <filesystem>
 #include <vector>
@@ -20,7 +21,22 @@ fs::path whole(const std::string& folder) {
     return real.has_filename() ? real : real.parent_path();
 }
 
+// Not where it holds what others have in a file: a region.
+bool names_file(const JsonDocument& doc, JsonIndex i) {
+    return doc.key(i) == "file" && doc.is(i, JsonType::String) && !doc.text(i).empty() &&
+           !doc.text(i).starts_with(kRegion);
+}
+
 }  // namespace
+
+std::vector<std::string> files_named(const std::string& scene, const std::string& folder) {
+    std::vector<std::string> out;
+    const auto doc = JsonDocument::parse(scene, "scene");
+    if (!doc) return out;
+    for (JsonIndex i = 0; i < doc->next(0); ++i)
+        if (names_file(*doc, i)) out.push_back((fs::path(folder) / doc->text(i)).generic_string());
+    return out;
+}
 
 std::string with_files_from(std::string scene, const std::string& from, const std::string& to) {
     const fs::path old_folder = whole(from), new_folder = whole(to);
@@ -39,8 +55,7 @@ std::string with_files_from(std::string scene, const std::string& from, const st
         if (doc->is(i, JsonType::Object) || doc->is(i, JsonType::Array)) {
             out.open(doc->type(i), doc->key(i));
             ends.push_back(doc->next(i));
-        } else if (doc->key(i) == "file" && doc->is(i, JsonType::String) && !doc->text(i).empty() &&
-                   fs::path(doc->text(i)).is_relative()) {
+        } else if (names_file(*doc, i) && fs::path(doc->text(i)).is_relative()) {
             out.add_text((old_folder / doc->text(i)).lexically_normal().lexically_relative(new_folder).generic_string(),
                          doc->key(i));
             moved = true;

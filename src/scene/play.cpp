@@ -174,14 +174,22 @@ Result<void> Play::restart() {
     auto again = scene::Simulation::again(*simulation_);
     if (!again) return again.error();
     simulation_ = std::move(*again);
+    events_.clear();
     ahead_ = 0;
     between_ = 1;
     return {};
 }
 
+Result<void> Play::make_step() {
+    if (auto done = simulation_->step(); !done) return done;
+    events_.insert(events_.end(), simulation_->events().begin(), simulation_->events().end());
+    return {};
+}
+
 Result<void> Play::step() {
     between_ = 1;
-    if (auto done = simulation_->step(); !done) return done;
+    events_.clear();
+    if (auto done = make_step(); !done) return done;
     return tell();
 }
 
@@ -190,9 +198,10 @@ Result<int> Play::advance(double seconds) {
         return Error{"playing: time goes on by a finite number of seconds, 0 or more", ErrorKind::Usage};
     const double step = simulation_->step_seconds();
     ahead_ += seconds;
+    events_.clear();
     int made = 0;
     for (; made < kMostSteps && ahead_ >= step; ++made, ahead_ -= step)
-        if (auto done = simulation_->step(); !done) return done.error();
+        if (auto done = make_step(); !done) return done.error();
     if (auto done = tell(); !done) return done.error();
     if (ahead_ >= step) {
         const double left = std::fmod(ahead_, step);
@@ -223,6 +232,15 @@ Result<void> Play::enter(vec3 feet) { return simulation_->enter(feet); }
 void Play::walk(vec3 velocity, float jump) { simulation_->wish(velocity, jump); }
 void Play::leave() { simulation_->leave(); }
 std::optional<PlayWalker> Play::walker() const { return simulation_->visitor(between_); }
+std::vector<PlayBody> Play::bodies() const {
+    std::vector<PlayBody> out;
+    for (const scene::Simulation::Member& m : simulation_->members()) {
+        if (m.gone) continue;
+        const physics::BodyState s = simulation_->state(m);
+        out.push_back({m.id, s.pose, s.linear_velocity, s.angular_velocity, s.asleep});
+    }
+    return out;
+}
 PlayCounts Play::counts() const { return simulation_->counts(); }
 
 }  // namespace kiln

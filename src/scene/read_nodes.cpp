@@ -3,11 +3,11 @@
 #include "scene/read_nodes.h"
 
 #include "scene/heights.h"
-#include "scene/suggest.h"
 
 #include "sdf/expression_code.h"
 
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <unordered_set>
 

@@ -2,9 +2,8 @@
 
 #include "scene/read_values.h"
 
-#include "scene/suggest.h"
-
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <cmath>
 

@@ -65,15 +65,13 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings,
     const auto frame = [&]() -> Result<void> {
         frames.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("bodies").raw("[");
         const char* between = "";
-        for (const scene::Simulation::Member& m : simulation.members()) {
-            if (m.gone) continue;
-            const physics::BodyState state = simulation.state(m);
-            frames.raw(between).raw("\n    {").key("id").quoted(m.id).raw(", ");
-            frames.key("position").vector(state.pose.position).raw(", ");
-            frames.key("rotation").rotation(state.pose.rotation).raw(", ");
-            frames.key("linear_velocity").vector(state.linear_velocity).raw(", ");
-            frames.key("angular_velocity").vector(state.angular_velocity).raw(", ");
-            frames.key("asleep").raw(state.asleep ? "true}" : "false}");
+        for (const PlayBody& b : play->bodies()) {
+            frames.raw(between).raw("\n    {").key("id").quoted(b.id).raw(", ");
+            frames.key("position").vector(b.pose.position).raw(", ");
+            frames.key("rotation").rotation(b.pose.rotation).raw(", ");
+            frames.key("linear_velocity").vector(b.linear_velocity).raw(", ");
+            frames.key("angular_velocity").vector(b.angular_velocity).raw(", ");
+            frames.key("asleep").raw(b.asleep ? "true}" : "false}");
             between = ",";
         }
         frames.raw("]");
@@ -103,7 +101,7 @@ Result<std::string> World::simulate_json(const SimulateSettings& settings,
     int64_t shown = 1;
     for (int64_t i = 1; i <= last; ++i) {
         if (auto done = play->step(); !done) return done.error();
-        for (const scene::Simulation::Event& e : simulation.events()) {
+        for (const PlayEvent& e : play->events()) {
             events.next().raw("\n  {").key("time").time(simulation.time()).raw(", ").key("type").quoted(e.type);
             events.raw(", ").key("a").quoted(e.a).raw(", ").key("b").quoted(e.b).raw("}");
         }

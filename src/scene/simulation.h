@@ -95,11 +95,7 @@ public:
     std::string name_of(physics::BodyId id) const;
 
     /// Of the last step: contacts that began or ended, then who entered or left triggers.
-    struct Event {
-        const char* type;  ///< "begin", "end", "enter", "leave"
-        std::string a, b;
-    };
-    const std::vector<Event>& events() const { return events_; }
+    const std::vector<PlayEvent>& events() const { return events_; }
 
 private:
     Simulation(const World& start, const SimulateSettings& settings) : start_(start), settings_(settings) {}
@@ -198,7 +194,7 @@ private:
     std::vector<Member> members_;
     std::vector<Walker> walkers_;
     std::map<physics::BodyId, std::string> names_;  // also of those that are no more
-    std::vector<Event> events_;
+    std::vector<PlayEvent> events_;
     float seconds_ = 0;
     int64_t steps_ = 0;
 

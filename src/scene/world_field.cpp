@@ -4,7 +4,6 @@
 #include "scene/exact.h"
 #include "scene/framing.h"
 #include "scene/region.h"
-#include "scene/suggest.h"
 #include "scene/world_impl.h"
 
 #include "render/lib/pack.h"
@@ -12,6 +11,7 @@
 
 #include "base/assert.h"
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <nlohmann/json.hpp>
 
@@ -312,7 +312,7 @@ Result<Camera> World::camera(std::string_view name) const {
         if (known == name) return value;
         names.push_back(known);
     }
-    return Error{formatted("there is no camera \"{}\"; {}", name, scene::suggestion(name, names)), ErrorKind::Usage};
+    return Error{formatted("there is no camera \"{}\"; {}", name, suggestion(name, names)), ErrorKind::Usage};
 }
 
 Result<Frame> World::frame(std::string_view name) const {

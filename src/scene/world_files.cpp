@@ -5,13 +5,13 @@
 
 #include "scene/bundled.h"
 #include "scene/moved_files.h"
-#include "scene/suggest.h"
 
 #include "base/assert.h"
 #include "base/atomic_file.h"
 #include "base/format.h"
 #include "base/log.h"
 #include "base/parallel_for.h"
+#include "base/suggest.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -62,9 +62,8 @@ Result<void> named(const std::string& path_or_name) {
     if (path_or_name.find_first_of("/.") != std::string::npos || ::stat(path_or_name.c_str(), &info) == 0) return {};
     std::vector<std::string_view> names;
     for (const scene::BundledScene& file : scene::bundled_files()) names.push_back(file.name);
-    return Error{
-        formatted("{}: neither a file nor a bundled scene; {}", path_or_name, scene::suggestion(path_or_name, names)),
-        ErrorKind::Input};
+    return Error{formatted("{}: neither a file nor a bundled scene; {}", path_or_name, suggestion(path_or_name, names)),
+                 ErrorKind::Input};
 }
 
 // A name for what is kept of a journal, that no file has.
@@ -463,6 +462,14 @@ Result<void> World::flush() const {
     if (!impl_->journal) return {};
     if (auto recorded = impl_->record_stage(*this); !recorded) return recorded;
     return impl_->journal->file.flush();
+}
+
+bool World::is_read_from(const std::string& file) const {
+    struct stat info {};
+    if (scene::is_bundled(impl_->data) || ::stat(file.c_str(), &info) != 0) return false;
+    std::vector<std::string> files = scene::files_named(to_json(), impl_->data.folder);
+    if (!impl_->data.source.empty()) files.emplace_back(impl_->data.source.name());
+    return std::ranges::any_of(files, [&](const std::string& read) { return scene::same_file(read, file); });
 }
 
 std::optional<JournalReport> World::journal_report() const { return impl_->report; }

@@ -7,6 +7,7 @@
 #include "sdf/expression_build.h"
 
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <array>
 #include <charconv>
@@ -386,7 +387,8 @@ private:
         }
         std::string mend = "use";
         for (const std::string_view n : all) mend += " " + std::string(n);
-        return fail(place, formatted("there is no {} \"{}\"; {}", what, name.substr(0, 40), mend));
+        return fail(place,
+                    formatted("there is no {} \"{}\"; {}", what, name.substr(0, 40), suggestion(name, all, mend)));
     }
 
     // .x, .y, .z or several of them.

@@ -3,6 +3,7 @@
 #include "sdf/expression_glsl_reader.h"
 
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <charconv>
 #include <cmath>
@@ -280,7 +281,7 @@ bool Reader::primary(Value& out) {
     ++at_;
     if (!is("(")) {
         const Variable* const v = find(t.text);
-        if (v == nullptr) return unknown(t);
+        if (v == nullptr) return unknown_variable(t);
         out = v->value;
         return true;
     }
@@ -342,8 +343,12 @@ bool Reader::called(const Token& what, Value& out) {
     return built_in(what, in, out);
 }
 
-bool Reader::unknown(const Token& t, std::string_view what) {
-    return fail(t.place, formatted("there is no {} \"{}\" here; declare it before", what, t.text.substr(0, 40)));
+bool Reader::unknown_variable(const Token& t) {
+    std::vector<std::string_view> known;
+    for (size_t i = first_visible_; i < variables_.size(); ++i) known.push_back(variables_[i].name);
+    for (const Variable& v : globals_) known.push_back(v.name);
+    return fail(t.place, formatted("there is no variable \"{}\" here; {}", t.text.substr(0, 40),
+                                   suggestion(t.text, known, "declare it before")));
 }
 
 }  // namespace kiln::sdf::glsl

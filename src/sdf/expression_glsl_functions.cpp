@@ -2,9 +2,24 @@
 // Constructors of types and the built-in functions of numbers and vectors.
 #include "sdf/expression_glsl_reader.h"
 
+#include "base/assert.h"
 #include "base/format.h"
+#include "base/suggest.h"
+
+#include <algorithm>
 
 namespace kiln::sdf::glsl {
+
+namespace {
+
+constexpr std::string_view kBuiltIns[] = {
+    "abs",   "sqrt",      "floor",     "sin",         "cos",        "exp",      "log",  "exp2",
+    "log2",  "radians",   "degrees",   "inversesqrt", "tan",        "asin",     "acos", "ceil",
+    "round", "roundEven", "fract",     "trunc",       "sign",       "atan",     "min",  "max",
+    "mod",   "pow",       "step",      "clamp",       "smoothstep", "mix",      "not",  "length",
+    "dot",   "distance",  "normalize", "cross",       "reflect",    "transpose"};
+
+}  // namespace
 
 bool Reader::construct(Type type, const std::vector<Value>& in, size_t place, Value& out) {
     out = {type, {}};
@@ -46,6 +61,14 @@ bool Reader::built_in(const Token& what, std::vector<Value>& in, Value& out) {
     const std::string_view f = what.text;
     Builder& b = build_;
     const size_t n = in.size(), place = what.place;
+    if (std::ranges::count(kBuiltIns, f) == 0) {
+        std::vector<std::string_view> known(std::begin(kBuiltIns), std::end(kBuiltIns));
+        for (const Function& own : functions_) known.push_back(own.name);
+        for (const TypeFacts& type : kTypes)
+            if (type.size > 0) known.push_back(type.name);
+        return fail(place, formatted("there is no function \"{}\" here; {}", f.substr(0, 40),
+                                     suggestion(f, known, "declare it before")));
+    }
     const auto takes = [&](size_t count) {
         return n == count ||
                fail(place, formatted("{} has {} operand{} here; it takes {}", f, n, n == 1 ? "" : "s", count));
@@ -53,7 +76,7 @@ bool Reader::built_in(const Token& what, std::vector<Value>& in, Value& out) {
     for (Value& v : in) {
         if (v.type == Type::Bool && f != "mix" && f != "not")
             return fail(place, formatted("{} of a condition; give it numbers", f));
-        if (is_matrix(v.type) && f != "transpose" && f != "determinant")
+        if (is_matrix(v.type) && f != "transpose")
             return fail(place, formatted("{} of a matrix; give it its columns", f));
     }
     // Of each component, one operand.
@@ -186,7 +209,8 @@ bool Reader::built_in(const Token& what, std::vector<Value>& in, Value& out) {
             for (size_t r = 0; r < side; ++r) out.at[c * side + r] = in[0].at[r * side + c];
         return true;
     }
-    return unknown(what, "function");
+    KILN_ASSERT(false, "{} is in the list of functions and not made", f);
+    return false;
 }
 
 }  // namespace kiln::sdf::glsl

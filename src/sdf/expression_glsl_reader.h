@@ -147,7 +147,7 @@ private:
     bool picked(Type of, std::array<int, 9>& picks, Type& type);
     bool primary(Value& out);
     bool called(const Token& what, Value& out);
-    bool unknown(const Token& t, std::string_view what = "variable");
+    bool unknown_variable(const Token& t);
 
     // ---- what comes with the language: expression_glsl_functions.cpp
 

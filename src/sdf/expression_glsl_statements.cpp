@@ -277,7 +277,7 @@ bool Reader::target(Target& out) {
     std::string_view what;
     if (!name(what)) return false;
     Variable* const v = find(what);
-    if (v == nullptr) return unknown(start);
+    if (v == nullptr) return unknown_variable(start);
     if (v->constant || v < variables_.data() || v >= variables_.data() + variables_.size())
         return fail(start.place, formatted("{} is a constant; give the new value another name", what));
     out.variable = size_t(v - variables_.data());

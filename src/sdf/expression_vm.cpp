@@ -5,6 +5,7 @@
 #include "sdf/expression_build.h"
 
 #include "base/format.h"
+#include "base/suggest.h"
 
 #include <charconv>
 #include <cmath>
@@ -123,10 +124,11 @@ Result<Formula> read_vm(std::string_view text) {
                    : op == "atan"  ? build.binary(Fn::Atan2, in[0], build.constant(1))
                                    : build.binary(Fn::Div, build.constant(1), in[0]);
         } else {
-            std::string all;
-            for (const std::string_view n : kOthers) all += " " + std::string(n);
-            for (const Operation& o : kOperations) all += " " + std::string(o.name);
-            return fail(1, formatted("there is no operation \"{}\"; use one of{}", shown(op), all));
+            std::vector<std::string_view> all(std::begin(kOthers), std::end(kOthers));
+            for (const Operation& o : kOperations) all.push_back(o.name);
+            std::string mend = "use one of";
+            for (const std::string_view n : all) mend += " " + std::string(n);
+            return fail(1, formatted("there is no operation \"{}\"; {}", shown(op), suggestion(op, all, mend)));
         }
         if (build.full()) return fail(0, formatted("more than {} operations; use a smaller model", kMaxFormulaNodes));
         if (build.not_finite())

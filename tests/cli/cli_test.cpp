@@ -121,9 +121,14 @@ TEST_F(Cli, WrongUsageIsTwo) {
         {"import a.csg -o b.kiln.json", "later version"},
         {"query potter --points - --nearest --field", "leave it out"},
         {"query potter --points - --nearest --rays", "leave it out"},
-        {"bench feild", "--list"},
+        {"bench feild", "did you mean \"field\"?"},
+        {"bench field/rais", "did you mean \"field/rays\"?"},
+        {"bench juggling", "`kiln bench --list` names them"},
         {"bench field --kind 3", "there is no kind 3"},
-        {"bench field --count 0", "between 1 and 1000000"},
+        {"bench field --count 0", "--count: Value 0 not in range 1 to 1000000"},
+        {"bench field --count -1", "--count: Value -1 not in range 1 to 1000000"},
+        {"bench field --count 99999999999", "--count: Value 99999999999 not in range 1 to 1000000"},
+        {"bench field --seed -1", "--seed = -1: not a value that it takes"},
         {"bench field --threads 0", "--threads"},
     };
     for (const auto& [words, says] : cases) {
@@ -159,6 +164,47 @@ TEST_F(Cli, ImportMakesASceneAndSaysWhatItFound) {
     EXPECT_NE(read(folder_ / "tet.kiln.json"), first);
     EXPECT_EQ(run("import tet.obj -o none/tet.kiln.json").code, 1);
     EXPECT_THAT(files(), testing::ElementsAre("tet.kiln.json", "tet.obj"));
+}
+
+// Results are written over, as compilers do; a scene is not, and never what is read.
+TEST_F(Cli, NothingIsWrittenOverThatSomebodyMadeOrThatIsRead) {
+    const std::string tet = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    write("tet.obj", tet);
+    ASSERT_EQ(run("import tet.obj -o tet.kiln.json --resolution 8").code, 0);
+    const std::string scene = read(folder_ / "tet.kiln.json");
+    std::filesystem::create_symlink("tet.obj", folder_ / "link.obj");
+    for (const char* words : {"export tet.kiln.json -o tet.obj", "export tet.kiln.json -o ./link.obj",
+                              "simulate tet.kiln.json --seconds 0.1 --keep tet.kiln.json --force",
+                              "view tet.kiln.json --frames 1 --ui-json tet.kiln.json"}) {
+        const Outcome o = run(words);
+        EXPECT_EQ(o.code, 2) << words << o.err;
+        EXPECT_THAT(o.err, HasSubstr("the scene is read from it; choose another name")) << words;
+        expect_one_line(o, words);
+    }
+    write("kept.kiln.json", "somebody's");
+    const Outcome kept = run("simulate tet.kiln.json --seconds 0.1 --keep kept.kiln.json");
+    EXPECT_EQ(kept.code, 1);
+    EXPECT_THAT(kept.err, HasSubstr("kept.kiln.json: is there already; choose another name, or add --force"));
+    EXPECT_EQ(read(folder_ / "kept.kiln.json"), "somebody's");
+    EXPECT_EQ(run("simulate tet.kiln.json --seconds 0.1 --keep kept.kiln.json --force").code, 0);
+    EXPECT_NE(read(folder_ / "kept.kiln.json"), "somebody's");
+    write("out.obj", "old");
+    EXPECT_EQ(run("export tet.kiln.json -o out.obj").code, 0);
+    EXPECT_NE(read(folder_ / "out.obj"), "old");
+    EXPECT_EQ(read(folder_ / "tet.obj"), tet);
+    EXPECT_EQ(read(folder_ / "tet.kiln.json"), scene);
+}
+
+// The game without a window, as somebody would try it.
+TEST_F(Cli, TheSampleOfAPlayTellsWhatTheBallHitsAndWhatFalls) {
+    const std::string program = std::filesystem::path(KILN_PROGRAM).parent_path() / "sample_play";
+    const int status = std::system(("'" + program + "' > '" + (folder_ / "said").string() + "'").c_str());
+    EXPECT_EQ(status, 0);
+    const std::string said = read(folder_ / "said");
+    EXPECT_THAT(said, testing::ContainsRegex("s: (can1 meets thrown1|thrown1 meets can1)"));
+    EXPECT_THAT(said, testing::Not(HasSubstr("world")));
+    EXPECT_THAT(said, testing::ContainsRegex("\n[123] of 3 fell"));
+    std::filesystem::remove(folder_ / "said");
 }
 
 TEST_F(Cli, HelpIsShortAndShowsExamplesFirst) {

@@ -14,6 +14,8 @@
 #include <fstream>
 #include <random>
 
+#include <sys/stat.h>
+
 namespace kiln::model {
 namespace {
 
@@ -83,6 +85,14 @@ TEST_F(ReadFile, BuffersBesideAGltfAreFound) {
     const auto lost = read(write("lost.gltf", gltf_json("gone.bin")));
     ASSERT_FALSE(lost);
     EXPECT_THAT(lost.error().message, StartsWith(path_ + "lost.gltf: "));
+    // What is no file has no bytes to wait for.
+    ASSERT_EQ(::mkfifo((path_ + "pipe.bin").c_str(), 0600), 0);
+    std::filesystem::create_directory(path_ + "folder.bin");
+    for (const char* name : {"pipe.bin", "folder.bin"}) {
+        const auto other = read(write("other.gltf", gltf_json(name)));
+        ASSERT_FALSE(other);
+        EXPECT_THAT(other.error().message, HasSubstr(std::string("not found : ") + name));
+    }
 }
 
 TEST_F(ReadFile, WhatIsNoModelSaysWhatWouldBe) {
@@ -96,6 +106,7 @@ TEST_F(ReadFile, WhatIsNoModelSaysWhatWouldBe) {
         EXPECT_EQ(mesh.error().kind, ErrorKind::Input);
         EXPECT_THAT(mesh.error().message, StartsWith(path + ":"));
         EXPECT_THAT(mesh.error().message, HasSubstr(";")) << "a mend";
+        EXPECT_THAT(mesh.error().message, Not(HasSubstr(":0"))) << "lines count from 1";
     }
 }
 
@@ -141,6 +152,23 @@ TEST(ReadModel, PolygonsBecomeFans) {
     EXPECT_EQ(off->faces, (std::vector<Face>{{0, 1, 2}, {0, 2, 3}}));
 }
 
+// {"a":{"a": … 1}} with braces, [[ … ]] with brackets.
+std::string nested(char open, char close, size_t deep) {
+    std::string out;
+    for (size_t i = 0; i < deep; ++i) out += open == '{' ? "{\"a\":" : "[";
+    return out + (open == '{' ? "1" : "") + std::string(deep, close);
+}
+
+// A binary file of this text alone.
+std::string glb_of(const std::string& json) {
+    const auto word = [](size_t value) {
+        std::string out;
+        for (int i = 0; i < 4; ++i) out += char(uint8_t(value >> (8 * i)));
+        return out;
+    };
+    return "glTF" + word(2) + word(json.size() + 20) + word(json.size()) + "JSON" + json;
+}
+
 TEST(ReadModel, FaultsSayWhereAndWhatToDo) {
     const auto replaced = [](std::string text, const std::string& from, const std::string& to) {
         text.replace(text.find(from), from.size(), to);
@@ -178,6 +206,19 @@ TEST(ReadModel, FaultsSayWhereAndWhatToDo) {
          replaced(gltf_text(), "\"scene\": 0",
                   "\"extensionsRequired\": [\"KHR_draco_mesh_compression\"], \"scene\": 0"),
          "without compression"},
+        {".gltf", replaced(gltf_text(), "\"scene\": 0", "\"extensionsRequired\": [\"KHR_warp\"], \"scene\": 0"),
+         "needs KHR_warp, which is not read; export it without"},
+        {".gltf", replaced(gltf_text(), "\"scene\": 0", "\"extras\": " + nested('[', ']', 600) + ", \"scene\": 0"),
+         "nested more than 512 deep"},
+        {".gltf", replaced(gltf_text(), "\"scene\": 0", "\"extras\": " + nested('{', '}', 200000) + ", \"scene\": 0"),
+         "nested more than 512 deep"},
+        {".glb",
+         glb_of(replaced(gltf_text(), "\"scene\": 0", "\"extras\": " + nested('[', ']', 200000) + ", \"scene\": 0")),
+         "nested more than 512 deep"},
+        {".gltf",
+         replaced(gltf_text(), "\"uri\": \"",
+                  "\"uri\": \"data:application/octet-stream;base64,!" + std::string(9999, 'A')),
+         " ...; export it again"},
     };
     for (const auto& [ending, bytes, says] : cases) {
         const auto mesh = parse(ending, bytes);
@@ -186,7 +227,17 @@ TEST(ReadModel, FaultsSayWhereAndWhatToDo) {
         EXPECT_THAT(mesh.error().message, StartsWith("m" + ending + ":"));
         EXPECT_THAT(mesh.error().message, HasSubstr(says));
         EXPECT_EQ(mesh.error().message.find('\n'), std::string::npos) << mesh.error().message;
+        EXPECT_LT(mesh.error().message.size(), 300u);
     }
+    // Brackets in a text are none, and what only changes looks is no reason to refuse a solid.
+    const std::string text = std::string(1000, '[') + "\\\"" + std::string(1000, '{');
+    const auto fine = parse(".gltf", replaced(gltf_text(), "\"scene\": 0",
+                                              "\"extensionsRequired\": [\"KHR_materials_unlit\"], "
+                                              "\"extras\": \"" +
+                                                  text + "\", \"scene\": 0"));
+    EXPECT_TRUE(fine) << fine.error().message;
+    EXPECT_TRUE(parse(
+        ".gltf", replaced(gltf_text(), "\"scene\": 0", "\"extras\": " + nested('[', ']', 500) + ", \"scene\": 0")));
 }
 
 // ---- Any bytes.

@@ -2,6 +2,7 @@
 // Files of input events, the camera that they move, and what is written over pictures.
 #include "player/canvas.h"
 #include "player/fly.h"
+#include "player/hud.h"
 #include "player/input.h"
 
 #include <gmock/gmock.h>
@@ -160,6 +161,28 @@ TEST(Canvas, TextIsAsWideAsItSaysAndStaysWithinThePicture) {
     canvas.text(38, 18, "edges");
     canvas.fill({-100, -100, 1000, 1000}, 255, 0, 0, 1);
     for (size_t i = 0; i < p.srgb.size(); i += 4) EXPECT_EQ(p.srgb[i], 255);
+}
+
+TEST(Hud, AMessageThatIsTooWideHasAsManyLinesAsItTakes) {
+    const auto height = [](int width, const char* text) {
+        Picture p;
+        p.width = width, p.height = 90;
+        p.srgb.assign(size_t(p.width) * size_t(p.height) * 4, 0);
+        Hud hud;
+        hud.hints = false;
+        hud.message = text;
+        const auto widgets = hud.draw(p);
+        EXPECT_EQ(widgets.size(), 1u);
+        const Rect bar = widgets[0].second;
+        EXPECT_LE(bar.x + bar.width, width);
+        EXPECT_EQ(bar.y + bar.height, p.height);
+        return bar.height;
+    };
+    const int one = height(200, "twelve signs");
+    EXPECT_EQ(height(12 * 6 + 6, "twelve signs"), one) << "it just fits";
+    EXPECT_EQ(height(12 * 6 + 5, "twelve signs"), one + 10);
+    EXPECT_EQ(height(40, "a b c d e f g h"), one + 20);
+    EXPECT_EQ(height(40, "averylongword"), one) << "what cannot be broken is cut";
 }
 
 }  // namespace

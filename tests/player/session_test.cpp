@@ -339,6 +339,146 @@ TEST_F(SessionOnAPillar, WhatIsNotSavedIsInTheJournalAndSaidSo) {
     EXPECT_EQ(session_->world_hash(), all);
 }
 
+// What another program writes: a wall instead of the pillar and its block.
+constexpr const char* kWall = R"({"format": 1, "field": {"voxel_size": 0.1},
+  "edits": [{"id": "ground", "shape": "plane"},
+            {"id": "wall", "shape": "box", "half_extents": [2, 1, 0.2], "position": [0, 1, 0]}]})";
+
+TEST_F(SessionOnAPillar, AFileThatAnotherProgramWroteIsLoadedAgainAndThePlayBeginsAnew) {
+    const uint64_t before = session_->world_hash();
+    run(5);
+    ok(session_->enter({3, 0.01f, 3}));
+    stroke();
+    ASSERT_TRUE(*session_->undo()) << "what is undone is no change that could be lost";
+    ok(session_->advance(0, 1e9));
+    EXPECT_FALSE(session_->dirty());
+    write_bytes(file_, kPillar);
+    EXPECT_FALSE(session_->look_at_file()) << "the same text, written again";
+    EXPECT_EQ(session_->undo_depth(), 0);
+    EXPECT_EQ(session_->steps(), 5);
+    write_bytes(file_, kWall);
+    ASSERT_TRUE(session_->look_at_file()) << session_->warning();
+    EXPECT_FALSE(session_->look_at_file()) << "once";
+    EXPECT_TRUE(session_->world().find_edit("wall"));
+    EXPECT_FALSE(session_->world().find_edit("pillar"));
+    EXPECT_EQ(session_->steps(), 0);
+    EXPECT_FALSE(session_->dirty());
+    EXPECT_EQ(session_->warning(), "");
+    EXPECT_EQ(session_->farewell(), "");
+    run(3);
+    ASSERT_TRUE(session_->walker());
+    EXPECT_NEAR(session_->walker()->feet.x, 3, 0.01f) << "who walks is still there";
+    (void)session_->play().frame(Camera{});
+    EXPECT_TRUE(session_->play().cast({.origin = {1.5f, 1, 5}, .direction = {0, 0, -1}})->hit) << "the play has it too";
+    // It is edited as any other.
+    stroke({1, 1, 0});
+    const uint64_t dug = session_->world_hash();
+    open();
+    EXPECT_EQ(session_->world_hash(), dug) << "the journal has it";
+    EXPECT_TRUE(session_->dirty()) << "and the file has not";
+    ASSERT_TRUE(session_->save());
+    EXPECT_FALSE(session_->look_at_file()) << "what is written here is no other program's";
+    open();
+    EXPECT_EQ(session_->world_hash(), dug);
+    EXPECT_FALSE(session_->dirty());
+    EXPECT_NE(dug, before);
+}
+
+TEST_F(SessionOnAPillar, AHalfWrittenFileIsOneErrorAndChangesNothing) {
+    const uint64_t before = session_->world_hash();
+    run(4);
+    const std::string wall = kWall;
+    for (const size_t length : {size_t{0}, wall.size() / 2, wall.size() - 1}) {
+        write_bytes(file_, wall.substr(0, length));
+        for (int i = 0; i < 2; ++i) {
+            EXPECT_FALSE(session_->look_at_file());
+            EXPECT_TRUE(session_->warning().starts_with(file_ + ":")) << session_->warning();
+            EXPECT_EQ(session_->warning().find('\n'), std::string::npos);
+        }
+    }
+    EXPECT_EQ(session_->world_hash(), before);
+    EXPECT_EQ(session_->steps(), 4);
+    run(1);
+    // What cannot be played is no better than what cannot be read.
+    write_bytes(file_, R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}],
+        "bodies": [{"id": "b", "edits": ["ground"]}]})");
+    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_NE(session_->warning().find("a body without end"), std::string::npos) << session_->warning();
+    EXPECT_EQ(session_->world_hash(), before);
+    write_bytes(file_, wall);
+    EXPECT_TRUE(session_->look_at_file());
+    EXPECT_EQ(session_->warning(), "");
+    EXPECT_TRUE(session_->world().find_edit("wall"));
+}
+
+TEST_F(SessionOnAPillar, WhereBothHaveChangedNeitherIsLost) {
+    const auto other = (folder_ / "pillar.other.kiln.json").string();
+    stroke();
+    const uint64_t dug = session_->world_hash();
+    write_bytes(file_, kWall);
+    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_NE(session_->warning().find("changed by another program"), std::string::npos) << session_->warning();
+    EXPECT_EQ(session_->world_hash(), dug);
+    EXPECT_EQ(bytes_of(file_), kWall);
+    auto saved = session_->save();
+    ASSERT_TRUE(saved) << saved.error().message;
+    EXPECT_NE(saved->find(other), std::string::npos) << *saved;
+    EXPECT_EQ(bytes_of(other), kWall);
+    EXPECT_EQ(session_->warning(), "");
+    EXPECT_EQ(session_->farewell(), "");
+    open();
+    EXPECT_EQ(session_->world_hash(), dug);
+    EXPECT_EQ(session_->note(), "");
+    // Saved before anyone has looked, and a name that is taken.
+    stroke({0.05f, 1, 0});
+    write_bytes(file_, kPillar);
+    ASSERT_TRUE(session_->save());
+    EXPECT_EQ(bytes_of(other), kWall);
+    EXPECT_EQ(bytes_of(folder_ / "pillar.other-2.kiln.json"), kPillar);
+    // Whoever takes all of theirs back gets the other's.
+    stroke({-0.05f, 1, 0});
+    write_bytes(file_, kWall);
+    EXPECT_FALSE(session_->look_at_file());
+    ASSERT_TRUE(*session_->undo());
+    EXPECT_TRUE(session_->look_at_file());
+    EXPECT_TRUE(session_->world().find_edit("wall"));
+}
+
+TEST_F(SessionOnAPillar, ChangesThatTheNextStartWouldNotFindAreLeftBesideTheScene) {
+    const std::string mine = (folder_ / "pillar.unsaved.kiln.json").string();
+    for (const bool gone : {false, true}) {
+        stroke();
+        const uint64_t dug = session_->world_hash();
+        if (gone)
+            std::filesystem::remove(file_);
+        else
+            write_bytes(file_, kWall);
+        EXPECT_FALSE(session_->look_at_file());
+        EXPECT_NE(session_->warning().find(gone ? "is gone" : "changed by another"), std::string::npos);
+        const std::string farewell = session_->farewell();
+        EXPECT_NE(farewell.find(mine), std::string::npos) << farewell;
+        EXPECT_EQ(farewell.find("goes on from there"), std::string::npos) << farewell;
+        session_.reset();
+        const auto kept = Session::open(mine, "");
+        ASSERT_TRUE(kept) << kept.error().message;
+        EXPECT_EQ((*kept)->world_hash(), dug);
+        if (gone) break;
+        open();
+        EXPECT_TRUE(session_->world().find_edit("wall")) << "as it was said";
+        std::filesystem::remove(mine);
+    }
+}
+
+TEST_F(SessionOnAPillar, WhatAnEarlierStartLeftInTheJournalIsNotLostToAnotherProgram) {
+    stroke();
+    const uint64_t dug = session_->world_hash();
+    open();
+    write_bytes(file_, kWall);
+    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_EQ(session_->world_hash(), dug);
+    EXPECT_NE(session_->farewell().find("pillar.unsaved.kiln.json"), std::string::npos);
+}
+
 TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
     const std::filesystem::path here = std::filesystem::current_path();
     std::filesystem::current_path(folder_.path());
@@ -354,6 +494,10 @@ TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
     const auto refused = (*other)->save();
     ASSERT_FALSE(refused);
     EXPECT_NE(refused.error().message.find("is there already"), std::string::npos);
+    // From then on the file is its own.
+    write_bytes("tumble.kiln.json", kWall);
+    EXPECT_TRUE((*made)->look_at_file());
+    EXPECT_TRUE((*made)->world().find_edit("wall"));
     std::filesystem::current_path(here);
 }
 

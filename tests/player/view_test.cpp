@@ -217,6 +217,16 @@ TEST_F(View, GpuKeysFlyThrowPauseAndShowWhatTheyShould) {
     EXPECT_EQ(uint8_t(png[23]), 20);
 }
 
+TEST_F(View, GpuAMessageIsSeenForThreeSeconds) {
+    write("v.jsonl", "{\"frame\": 1, \"key\": \"v\", \"down\": true}\n");
+    const Outcome o = run("view pillar.kiln.json --size 16x9 --frames 190 --keys v.jsonl --ui-json a.jsonl");
+    ASSERT_EQ(o.code, 0) << o.err;
+    std::istringstream in(read("a.jsonl"));
+    std::string line;
+    for (int i = 0; std::getline(in, line); ++i)
+        EXPECT_EQ(line.find("\"message\"") != std::string::npos, i >= 1 && i <= 180) << i;
+}
+
 TEST_F(View, GpuWalksJumpsLooksAndDigsWhereTheCrossIs) {
     write("walk.jsonl", R"({"frame": 0, "mouse": [1, 1]}
 {"frame": 1, "key": "f", "down": true}
@@ -290,6 +300,50 @@ TEST_F(View, GpuADisplayThatIsTakenAwayEndsWellAndTheJournalHasWhatWasDug) {
     const Outcome again = run("view pillar.kiln.json --size 64x36 --frames 1 --ui-json a.jsonl");
     EXPECT_EQ(again.code, 0) << again.err;
     EXPECT_THAT(again.err, HasSubstr("pillar.kiln.json"));
+}
+
+TEST_F(View, GpuASceneThatAnotherProgramWritesIsSeenInTheWindow) {
+    VirtualDisplay display;
+    const pid_t child = ::fork();
+    if (child == 0) {
+        const std::string command =
+            "cd '" + folder_.string() + "' && exec '" KILN_PROGRAM "' view pillar.kiln.json --size 64x36 2>.err";
+        ::execl("/bin/sh", "sh", "-c", command.c_str(), static_cast<char*>(nullptr));
+        ::_exit(127);
+    }
+    int status = 0;
+    bool ended = false;
+    const auto wait_for = [&](const auto& what) {
+        while (!ended && !what()) {
+            ::usleep(1000);
+            ended = ::waitpid(child, &status, WNOHANG) != 0;
+        }
+        return !ended;
+    };
+    const auto said = [&](const std::string& words) {
+        return wait_for([&] { return read(".err").find(words) != std::string::npos; });
+    };
+    using Pixels = std::vector<std::array<uint8_t, 3>>;
+    const auto differ_by_half_a_window = [&](const Pixels& a, const Pixels& b) {
+        int count = 0;
+        for (size_t i = 0; i < std::min(a.size(), b.size()); ++i) count += a[i] != b[i];
+        return count > 64 * 36 / 2;
+    };
+    const Pixels nothing = display.screen().rgb;
+    Pixels before;
+    ASSERT_TRUE(wait_for([&] { return differ_by_half_a_window(before = display.screen().rgb, nothing); }));
+    write("pillar.kiln.json", "{\"format\": 1, ");
+    EXPECT_TRUE(said("pillar.kiln.json:1:"));
+    write("pillar.kiln.json", R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "wall", "shape": "box",
+      "half_extents": [9, 9, 1], "position": [0, 1, 0]}]})");
+    EXPECT_TRUE(said("is loaded again"));
+    EXPECT_TRUE(wait_for([&] { return differ_by_half_a_window(display.screen().rgb, before); }));
+    display.take_away();
+    if (!ended) {
+        ASSERT_EQ(::waitpid(child, &status, 0), child);
+    }
+    EXPECT_TRUE(WIFEXITED(status)) << status;
+    EXPECT_EQ(read("pillar.kiln.json").find("pillar\""), std::string::npos);
 }
 
 TEST_F(View, GpuADisplayThatIsNotThereEndsWellOrDrawsWithoutAWindow) {

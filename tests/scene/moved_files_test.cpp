@@ -63,5 +63,34 @@ TEST(MovedFiles, ASceneSavedElsewhereFindsItsModels) {
     EXPECT_THAT(moved->faults(), testing::IsEmpty());
 }
 
+TEST(MovedFiles, ARegionIsNoFile) {
+    const std::string scene =
+        R"({"edits": [{"file": "region:0.1:0,0,0:1,1,1:f"}, {"file": ""}, {"file": "m.obj"}], "file": 3})";
+    const std::string moved = scene::with_files_from(scene, "a", "b");
+    EXPECT_THAT(moved, testing::HasSubstr("\"region:0.1:0,0,0:1,1,1:f\""));
+    EXPECT_THAT(moved, testing::HasSubstr("\"../a/m.obj\""));
+    EXPECT_THAT(scene::files_named(scene, "a/"), testing::ElementsAre("a/m.obj"));
+    EXPECT_THAT(scene::files_named("{", ""), testing::IsEmpty());
+}
+
+TEST(MovedFiles, AWorldKnowsWhatItIsReadFrom) {
+    const TempFolder folder;
+    const std::string scene = (folder / "s.kiln.json").string();
+    write_bytes(folder / "f.vm", "a var-x\n");
+    write_bytes(folder / "g.vm", "a var-x\n");
+    write_bytes(scene, R"({"format": 1, "edits": [{"shape": "expression", "file": "f.vm"}]})");
+    std::filesystem::create_symlink("f.vm", folder / "link.vm");
+    const auto world = World::load(scene);
+    ASSERT_TRUE(world) << world.error().message;
+    EXPECT_TRUE(world->is_read_from(scene));
+    EXPECT_TRUE(world->is_read_from((folder / "../").string() + folder.path().filename().string() + "/s.kiln.json"));
+    EXPECT_TRUE(world->is_read_from((folder / "f.vm").string()));
+    EXPECT_TRUE(world->is_read_from((folder / "link.vm").string()));
+    EXPECT_FALSE(world->is_read_from((folder / "g.vm").string()));
+    EXPECT_FALSE(world->is_read_from((folder / "none").string()));
+    EXPECT_FALSE(World().is_read_from(""));
+    EXPECT_FALSE(World::load("orbit")->is_read_from("orbit"));
+}
+
 }  // namespace
 }  // namespace kiln

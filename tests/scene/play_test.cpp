@@ -153,6 +153,65 @@ TEST(Play, TimeThatGoesByMakesStepsAndFramesStandBetweenThem) {
     }
 }
 
+// What a program asks step by step is what simulate tells of the whole.
+TEST(Play, BodiesAndEventsAreThoseThatSimulateTells) {
+    std::string text = kScene;
+    text.insert(text.rfind('}'), R"(, "objects": {"zone": {"shape": "box", "half_extents": [0.5, 0.2, 0.5]}},
+        "triggers": [{"id": "gate", "object": "zone", "position": [0.2, 1, 0]}])");
+    const World world = parsed(text);
+    for (const std::string& engine : engines()) {
+        const auto told = world.simulate_json({.seconds = 1, .backend = engine});
+        ASSERT_TRUE(told) << told.error().message;
+        const json ways = json::parse(*told);
+        Play play = started(world, engine);
+        EXPECT_TRUE(play.events().empty());
+        json events = json::array();
+        for (int i = 0; i <= 60; ++i) {
+            if (i > 0) {
+                ASSERT_TRUE(play.step());
+            }
+            const auto bodies = play.bodies();
+            const json& frame = ways["frames"][size_t(i)]["bodies"];
+            ASSERT_EQ(bodies.size(), frame.size());
+            for (size_t k = 0; k < bodies.size(); ++k) {
+                EXPECT_EQ(bodies[k].id, frame[k]["id"]);
+                EXPECT_EQ(bodies[k].pose.position.y, frame[k]["position"][1].get<float>()) << i;
+                EXPECT_EQ(bodies[k].linear_velocity.x, frame[k]["linear_velocity"][0].get<float>()) << i;
+                EXPECT_EQ(bodies[k].asleep, frame[k]["asleep"]);
+            }
+            for (const PlayEvent& e : play.events()) events.push_back({std::string(e.type), e.a, e.b});
+        }
+        ASSERT_EQ(events.size(), ways["events"].size());
+        bool entered = false;
+        for (size_t i = 0; i < events.size(); ++i) {
+            const json& e = ways["events"][i];
+            EXPECT_EQ(events[i], json({e["type"], e["a"], e["b"]}));
+            entered = entered || events[i] == json({"enter", "gate", "b"});
+        }
+        EXPECT_TRUE(entered);
+        // Several steps at once, none of whose events is lost.
+        Play other = started(world, engine);
+        json again = json::array();
+        for (int i = 0; i < 20; ++i) {
+            ASSERT_EQ(*other.advance(3.0001 / 60), 3);
+            for (const PlayEvent& e : other.events()) again.push_back({std::string(e.type), e.a, e.b});
+        }
+        EXPECT_EQ(again, events);
+        // What is launched is the last of them.
+        Edit ball;
+        ball.node.shape = Sphere{.radius = 0.2f};
+        ball.node.transform.position = {3, 5, 0};
+        ASSERT_TRUE(other.launch(ball, {0, 1, 0}));
+        EXPECT_EQ(other.bodies().size(), 3u);
+        EXPECT_EQ(other.bodies().back().pose.position, (vec3{3, 5, 0}));
+        for (int i = 0; i < 300 && other.events().empty(); ++i) ASSERT_TRUE(other.step());
+        ASSERT_FALSE(other.events().empty()) << "it falls on the ground";
+        ASSERT_TRUE(other.restart());
+        EXPECT_TRUE(other.events().empty());
+        EXPECT_EQ(other.bodies().size(), 2u);
+    }
+}
+
 TEST(Play, CommandsChangeTheGroundBeforeTheNextStepAndNeverABody) {
     const World world = parsed(kScene);
     for (const std::string& engine : engines()) {

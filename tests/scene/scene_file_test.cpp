@@ -8,7 +8,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <map>
 
 namespace kiln::scene {
 namespace {
@@ -310,26 +312,49 @@ TEST(SceneFile, TheExampleOfTheFormatReads) {
     EXPECT_EQ(fault_of(page.substr(begin + 8, end - begin - 8)), "");
 }
 
+// Where the page tells a table's keys: behind this, up to the next heading.
+std::string_view place_in_documentation(const Table& table) {
+    static const std::map<std::string_view, std::string_view> kPlaces = {
+        {"scene", "## Top level"},         {"field", "## `field`"},       {"bounds", "## Boxes"},
+        {"material", "## `materials`"},    {"light", "## `lights`"},      {"environment", "## `environment`"},
+        {"camera", "## `cameras`"},        {"edit", "## `edits`"},        {"node", "## `objects`"},
+        {"outline", "### `outline`"},      {"mesh", "### `meshes`"},      {"physics", "### `physics`"},
+        {"body", "### `bodies`"},          {"trigger", "### `triggers`"}, {"wish", "An entry of `path`"},
+        {"character", "### `characters`"}, {"cloth", "### `cloths`"},     {"fluid", "### `fluids`"}};
+    const auto found = kPlaces.find(table.name);
+    return found == kPlaces.end() ? std::string_view{} : found->second;
+}
+
 TEST(SceneFile, EveryKeyOfTheTablesIsInTheDocumentation) {
     std::ifstream in(std::string(KILN_SOURCE_DIR) + "/docs/scene-format.md");
     const std::string page((std::istreambuf_iterator<char>(in)), {});
-    // A word that a key may have: quoted somewhere, or in a line of the key.
-    const auto told = [&](std::string_view key, std::string_view word) {
-        if (page.find(formatted("`{}`", word)) != std::string::npos) return true;
-        if (page.find(formatted("\"{}\"", word)) != std::string::npos) return true;
-        const std::string begin = formatted("\n| `{}` |", key);
-        for (size_t at = page.find(begin); at != std::string::npos; at = page.find(begin, at + 1))
-            if (page.substr(at + 1, page.find('\n', at + 1) - at).find(word) != std::string::npos) return true;
-        return false;
-    };
-    for (const Table* table : {&kSceneTable, &kFieldTable, &kMaterialTable, &kLightTable, &kEnvironmentTable,
-                               &kCameraTable, &kEditTable, &kNodeTable, &kOutlineTable, &kMeshTable, &kPhysicsTable,
-                               &kBodyTable, &kTriggerTable, &kClothTable, &kFluidTable})
-        for (const KeyRow& row : table->rows) {
-            EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`")) << table->name;
-            for (const std::string_view word : row.choices)
-                EXPECT_TRUE(told(row.name, word)) << row.name << ": " << word;
+    std::vector<const Table*> tables{&kSceneTable};
+    for (size_t i = 0; i < tables.size(); ++i) {
+        const Table& table = *tables[i];
+        const std::string_view place = place_in_documentation(table);
+        const size_t begin = place.empty() ? std::string::npos : page.find("\n" + std::string(place));
+        ASSERT_NE(begin, std::string::npos) << "no place for " << table.name;
+        const std::string part = page.substr(begin, page.find("\n#", begin + 1) - begin);
+        for (const KeyRow& row : table.rows) {
+            if (row.table != nullptr && std::ranges::count(tables, row.table) == 0) tables.push_back(row.table);
+            // As the schema has it.
+            const bool number = row.type == KeyType::Numbers;
+            const std::string unit = number && row.numbers.unit != "1" ? formatted(" ({})", row.numbers.unit) : "";
+            const std::string_view range = number && row.numbers.range != "any" ? row.numbers.range : "";
+            EXPECT_THAT(part, HasSubstr(formatted("\n| `{}` | {}{} | {} |", row.name, row.doc, unit, range)))
+                << table.name;
+            const std::string line = formatted("\n| `{}` | {}", row.name, row.doc);
+            const size_t at = std::min(part.find(line), part.size());
+            EXPECT_EQ(part.substr(at, part.find('\n', at + 1) - at).ends_with("| required |"), row.required)
+                << row.name;
+            for (const std::string_view word : row.choices) {
+                const std::string prose = formatted("`{}`", word);
+                EXPECT_TRUE(row.doc.find(word) != std::string_view::npos || part.find(prose) != std::string::npos)
+                    << table.name << " " << row.name << ": " << word;
+            }
         }
+    }
+    EXPECT_EQ(tables.size(), 18u);
     for (const auto rows : {sdf::shape_rows(), sdf::warp_rows()})
         for (const sdf::KindRow& row : rows) {
             EXPECT_THAT(page, HasSubstr("`" + std::string(row.name) + "`"));

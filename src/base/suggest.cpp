@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 
-#include "scene/suggest.h"
-
-#include <kiln/world.h>
+#include "base/suggest.h"
 
 #include <algorithm>
+#include <utility>
+#include <vector>
 
-namespace kiln::scene {
+namespace kiln {
 
+namespace {
+
+// Fewest insertions, deletions, changes and swaps of neighbours between two words
+// (Damerau, "A technique for computer detection and correction of spelling errors", 1964; optimal string alignment).
 int edit_distance(std::string_view a, std::string_view b) {
     a = a.substr(0, 64);
     b = b.substr(0, 64);
@@ -26,18 +30,7 @@ int edit_distance(std::string_view a, std::string_view b) {
     return last[b.size()];
 }
 
-std::string suggestion(std::string_view word, std::span<const std::string_view> known) {
-    if (const std::string_view near = nearest_word(word, known); !near.empty())
-        return "did you mean \"" + std::string(near) + "\"?";
-    if (known.empty()) return "there are none here";
-    std::string out = "known are ";
-    for (size_t i = 0; i < known.size() && i < 12; ++i) out += (i ? ", " : "") + std::string(known[i]);
-    return known.size() > 12 ? out + ", ..." : out;
-}
-
-}  // namespace kiln::scene
-
-namespace kiln {
+}  // namespace
 
 std::string_view nearest_word(std::string_view word, std::span<const std::string_view> known) {
     std::string_view best;
@@ -45,13 +38,25 @@ std::string_view nearest_word(std::string_view word, std::span<const std::string
     for (const std::string_view candidate : known) {
         // A word that begins with what was typed counts as one slip away.
         const bool begins = word.size() >= 3 && candidate.starts_with(word);
-        const int d = begins ? 1 : scene::edit_distance(word, candidate);
+        const int d = begins ? 1 : edit_distance(word, candidate);
         if (d < best_distance && d < int(candidate.size())) {
             best = candidate;
             best_distance = d;
         }
     }
     return best;
+}
+
+std::string suggestion(std::string_view word, std::span<const std::string_view> known, std::string otherwise) {
+    const std::string_view near = nearest_word(word, known);
+    return near.empty() ? otherwise : "did you mean \"" + std::string(near) + "\"?";
+}
+
+std::string suggestion(std::string_view word, std::span<const std::string_view> known) {
+    if (known.empty()) return "there are none here";
+    std::string all = "known are ";
+    for (size_t i = 0; i < known.size() && i < 12; ++i) all += (i ? ", " : "") + std::string(known[i]);
+    return suggestion(word, known, known.size() > 12 ? all + ", ..." : all);
 }
 
 }  // namespace kiln
