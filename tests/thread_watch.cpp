@@ -13,7 +13,7 @@
 
 namespace {
 
-std::atomic<int> started{0};
+std::atomic<int> threads_started{0};
 
 // As the compiler was given it: from wherever the build is.
 bool says_so(const std::string& path) {
@@ -26,11 +26,11 @@ bool says_so(const std::string& path) {
 }
 
 class Watch : public testing::EmptyTestEventListener {
-    void OnTestStart(const testing::TestInfo&) override { started = 0; }
+    void OnTestStart(const testing::TestInfo&) override { threads_started = 0; }
     void OnTestEnd(const testing::TestInfo& test) override {
         // A software device has threads of its own.
         const std::string name = std::string(test.test_suite_name()) + "." + test.name();
-        if (started == 0 || name.find("Gpu") != std::string::npos || says_so(test.file())) return;
+        if (threads_started == 0 || name.find("Gpu") != std::string::npos || says_so(test.file())) return;
         ADD_FAILURE() << test.file() << " starts threads; give it the line \"// Starts threads.\" below its licence";
     }
 };
@@ -44,6 +44,6 @@ class Watch : public testing::EmptyTestEventListener {
 
 extern "C" int pthread_create(pthread_t* thread, const pthread_attr_t* attributes, void* (*run)(void*), void* with) {
     static const auto real = reinterpret_cast<decltype(&::pthread_create)>(::dlsym(RTLD_NEXT, "pthread_create"));
-    ++started;
+    ++threads_started;
     return real(thread, attributes, run, with);
 }

@@ -26,7 +26,7 @@ std::vector<float> values_of_cell(const sdf::TapeView& tape, const int (&texel)[
     return out;
 }
 
-void each_cell(const Field& field, const std::function<void(int, int, int, uint32_t)>& fn) {
+void each_cell_of(const Field& field, const std::function<void(int, int, int, uint32_t)>& fn) {
     const GridParams g = field.grid();
     for (int z = g.cell_z; z < g.cell_z + g.size_z; ++z) {
         for (int y = g.cell_y; y < g.cell_y + g.size_y; ++y) {
@@ -40,7 +40,7 @@ void expect_true_field(const Field& field, const std::string& name) {
     const float h = field.grid().voxel_size;
     uint32_t bricks = 0;
     int wrong = 0;
-    each_cell(field, [&](int x, int y, int z, uint32_t word) {
+    each_cell_of(field, [&](int x, int y, int z, uint32_t word) {
         if (wrong > 3) return;
         const int texel[3] = {x * 7, y * 7, z * 7};
         const std::vector<float> full = values_of_cell(sdf::view(field.program()), texel, h);
@@ -114,7 +114,7 @@ TEST(Field, CullingLooksAtFewLeaves) {
 TEST(Field, JumpsLeadOverEmptyCellsOfOneSign) {
     for (const worlds::World& world : {worlds::boxes(), worlds::thin_walls(), worlds::sphere_of(40)}) {
         const std::shared_ptr<const Field> field = world.field();
-        each_cell(*field, [&](int x, int y, int z, uint32_t word) {
+        each_cell_of(*field, [&](int x, int y, int z, uint32_t word) {
             if ((word & kCellOccupied) != 0) return;
             const int jump = int(word & 7u);
             ASSERT_GE(jump, 1);
@@ -138,7 +138,7 @@ TEST(Field, JumpsLeadOverEmptyCellsOfOneSign) {
 }
 
 void expect_same_bytes(const Field& a, const Field& b) {
-    each_cell(a, [&](int x, int y, int z, uint32_t word) { ASSERT_EQ(word, b.cell_word(x, y, z)); });
+    each_cell_of(a, [&](int x, int y, int z, uint32_t word) { ASSERT_EQ(word, b.cell_word(x, y, z)); });
     EXPECT_TRUE(std::ranges::equal(a.code(), b.code()));
     ASSERT_EQ(a.slots(), b.slots());
     for (const uint32_t slot : a.slots())
@@ -160,11 +160,11 @@ TEST(Field, EmptyAndSolidWorldsHaveNoBricks) {
     worlds::World world{"nothing", {}, {.voxel_size = 0.05f, .bounds = {{-2, -2, -2}, {2, 2, 2}}}};
     std::shared_ptr<const Field> field = world.field();
     EXPECT_EQ(field->stats().bricks, 0u);
-    each_cell(*field, [](int, int, int, uint32_t word) { ASSERT_EQ(word, uint32_t(kMaxJump)); });
+    each_cell_of(*field, [](int, int, int, uint32_t word) { ASSERT_EQ(word, uint32_t(kMaxJump)); });
     world.edits = {worlds::edit(Box{.half_extents = {50, 50, 50}})};
     field = world.field();
     EXPECT_EQ(field->stats().bricks, 0u);
-    each_cell(*field, [](int, int, int, uint32_t word) { ASSERT_EQ(word, kCellInside | uint32_t(kMaxJump)); });
+    each_cell_of(*field, [](int, int, int, uint32_t word) { ASSERT_EQ(word, kCellInside | uint32_t(kMaxJump)); });
     world.edits = {worlds::edit(Box{.half_extents = {50, 50, 50}}, {}, Op::Subtract)};
     field = world.field();
     EXPECT_EQ(field->stats().bricks, 0u);
@@ -279,7 +279,7 @@ void change(worlds::Random& r, std::vector<Edit>& edits) {
 void expect_equal_fields(const Field& got, const Field& expected, const std::string& name) {
     ASSERT_EQ(got.cells().size(), expected.cells().size());
     uint32_t live = 0;
-    each_cell(got, [&](int x, int y, int z, uint32_t a) {
+    each_cell_of(got, [&](int x, int y, int z, uint32_t a) {
         const uint32_t b = expected.cell_word(x, y, z);
         ASSERT_EQ((a & kCellOccupied) != 0 ? kCellOccupied : a, (b & kCellOccupied) != 0 ? kCellOccupied : b)
             << name << " cell " << x << " " << y << " " << z;
@@ -314,7 +314,7 @@ TEST(Field, IncrementalIsFullAfterRandomEdits) {
             // Bricks that are no jobs keep their slots.
             std::vector<bool> job(next.slot_count(), false);
             for (const uint32_t slot : next.jobs()) job[slot] = true;
-            each_cell(next, [&](int x, int y, int z, uint32_t word) {
+            each_cell_of(next, [&](int x, int y, int z, uint32_t word) {
                 if ((word & kCellOccupied) == 0 || job[word & kCellSlotMask]) return;
                 ASSERT_EQ(word, field->cell_word(x, y, z)) << name;
             });

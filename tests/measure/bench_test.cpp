@@ -302,7 +302,11 @@ TEST(Bench, WrongWordsAreToldWithTheMend) {
     const auto report = run_bench(unknown, small({0}));
     ASSERT_FALSE(report);
     EXPECT_EQ(report.error().kind, ErrorKind::Usage);
-    EXPECT_THAT(report.error().message, HasSubstr("--list"));
+    EXPECT_THAT(report.error().message, HasSubstr("did you mean \"field\"?"));
+    const std::vector<std::string> far_off{"weather"};
+    const auto none_near = run_bench(far_off, small({0}));
+    ASSERT_FALSE(none_near);
+    EXPECT_THAT(none_near.error().message, HasSubstr("--list"));
     EXPECT_FALSE(run_bench({}, small({3})));
     BenchOptions none = small({0});
     none.count = 0;

@@ -24,14 +24,14 @@ namespace {
 struct OnTriangles : Engines {};
 KILN_EACH_ENGINE(OnTriangles);
 
-constexpr float kCell = 0.2f;
+constexpr float kGroundCell = 0.2f;
 
 std::shared_ptr<const Triangles> meshed(const std::vector<Edit>& edits, float reach) {
     const auto exact = field_of(edits);
     auto program = sdf::compile({edits, {}, {}});
     const auto host =
         field::HostBricks::build(std::make_shared<const sdf::Program>(std::move(*program)),
-                                 {.voxel_size = kCell, .bounds = {{-reach, -3, -reach}, {reach, 3, reach}}});
+                                 {.voxel_size = kGroundCell, .bounds = {{-reach, -3, -reach}, {reach, 3, reach}}});
     EXPECT_TRUE(host);
     field::Mesh mesh;
     field::mesh_smooth(field::MeshBricks(*host), mesh);
@@ -53,7 +53,8 @@ TEST_P(OnTriangles, ThingsComeToRestWhereTheyDoOnTheField) {
             std::vector<std::vector<vec3>> rests;
             for (const bool on_mesh : {false, true}) {
                 Scene s(GetParam());
-                s.add({.shape = on_mesh ? BodyShape(mesh) : BodyShape(fixed(edits, kCell)), .motion = Motion::Static});
+                s.add({.shape = on_mesh ? BodyShape(mesh) : BodyShape(fixed(edits, kGroundCell)),
+                       .motion = Motion::Static});
                 rests.emplace_back();
                 std::vector<BodyId> ids;
                 for (const vec3 at : {vec3{0.1f, 0.7f, 0.13f}, vec3{4.1f, 1.2f, 0.1f}})
@@ -63,7 +64,7 @@ TEST_P(OnTriangles, ThingsComeToRestWhereTheyDoOnTheField) {
                 for (const BodyId id : ids) rests.back().push_back(s.world->state(id).pose.position);
             }
             for (size_t i = 0; i < (lies ? 1u : 2u); ++i)
-                EXPECT_NEAR(rests[0][i].y, rests[1][i].y, 0.25f * kCell) << solid.name << as_field << i;
+                EXPECT_NEAR(rests[0][i].y, rests[1][i].y, 0.25f * kGroundCell) << solid.name << as_field << i;
         }
     }
 }
@@ -104,7 +105,7 @@ TEST_P(OnTriangles, BowlsOfThemCostABallMoreEnergyThanTheField) {
         float left[2];
         for (const bool on_mesh : {false, true}) {
             Scene s(GetParam());
-            s.add({.shape = on_mesh ? BodyShape(mesh) : BodyShape(fixed(w.edits, kCell)),
+            s.add({.shape = on_mesh ? BodyShape(mesh) : BodyShape(fixed(w.edits, kGroundCell)),
                    .motion = Motion::Static,
                    .friction = 0});
             const BodyId id =
@@ -233,7 +234,7 @@ TEST_P(OnTriangles, AMeshThatMovesFallsRollsAndRestsOnFieldsAndTrianglesAndOther
     for (const bool on_mesh : {false, true}) {
         Scene s(GetParam());
         const std::vector<Edit> edits{edit(Plane{}, {0, 0.05f, 0})};
-        s.add({.shape = on_mesh ? BodyShape(meshed(edits, 8)) : BodyShape(fixed(edits, kCell)),
+        s.add({.shape = on_mesh ? BodyShape(meshed(edits, 8)) : BodyShape(fixed(edits, kGroundCell)),
                .motion = Motion::Static});
         const BodyId low = s.add({.shape = mesh, .pose = {{0, 0.5f, 0}, {}}, .density = 500});
         EXPECT_NEAR(s.world->mass(low), 500 * 8 * 0.5 * 0.3 * 0.4, 1e-3);

@@ -5,6 +5,7 @@
 #include "field/brick_set.h"
 #include "field/clipmap.h"
 #include "gpu_worlds.h"
+#include "rgb_of.h"
 #include "image/metrics.h"
 #include "render/lib/color.gpu.h"
 #include "render/lib/pack.h"
@@ -383,20 +384,6 @@ TEST_F(AoGpu, BordersOfLevelsDoNotShow) {
                 }
         }
     }
-}
-
-image::Rgb rgb_of(const Picture& p) {
-    image::Rgb out{p.width, p.height, {}};
-    for (size_t i = 0; i < p.srgb.size(); ++i)
-        if (i % 4 != 3) out.values.push_back(float(p.srgb[i]) / 255);
-    return out;
-}
-
-image::Rgb rgb_of(const ReferencePicture& p) {
-    image::Rgb out{p.width, p.height, {}};
-    for (size_t i = 0; i < p.rgba.size(); ++i)
-        if (i % 4 != 3) out.values.push_back(shade::srgb_from_linear(std::clamp(p.rgba[i], 0.0f, 1.0f)));
-    return out;
 }
 
 // Sixteen pictures over time look along sixteen sets; without time it is always the first.

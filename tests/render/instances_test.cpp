@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Instances against the same solids in the world's list, against rays through their host bricks, and what moving them costs.
 #include "gpu_worlds.h"
+#include "rgb_of.h"
 #include "render/temporal.h"
 
 #include "field/brick_set.h"
@@ -38,14 +39,6 @@ Edit at(Edit e, const Pose& pose) {
     e.node.transform.position = pose.position;
     e.node.transform.rotation = pose.rotation;
     return e;
-}
-
-image::Rgb shown(const Picture& picture) {
-    image::Rgb out{picture.width, picture.height, {}};
-    for (size_t i = 0; i < picture.srgb.size(); ++i) {
-        if (i % 4 != 3) out.values.push_back(float(picture.srgb[i]) / 255);
-    }
-    return out;
 }
 
 // Six objects of three kinds about the blends on their ground, as edits and as instances.
@@ -118,7 +111,7 @@ TEST(InstancePicturesGpu, DrawWhatTheSameEditsInTheWorldDraw) {
         EXPECT_GT(compared, 12000);
         // Silhouettes fall to either side of a pixel's middle.
         EXPECT_LE(off, c.most_off) << "disc " << c.disc_deg << ", refine " << c.refine;
-        EXPECT_LE(image::flip(shown(*a), shown(*b)), c.most_flip) << "disc " << c.disc_deg << ", refine " << c.refine;
+        EXPECT_LE(image::flip(rgb_of(*a), rgb_of(*b)), c.most_flip) << "disc " << c.disc_deg << ", refine " << c.refine;
     }
 }
 
@@ -281,7 +274,7 @@ TEST(InstancePicturesGpu, TheExactPathDrawsTheSameAndIsTheHardUnionOfMovedProgra
         off += std::isinf(a->depth[i]) != std::isinf(b->depth[i]) ||
                (!std::isinf(a->depth[i]) && std::fabs(a->depth[i] - b->depth[i]) > 1e-4f * a->depth[i]);
     EXPECT_LE(off, 2);
-    EXPECT_LE(image::flip(shown(*a), shown(*b)), 0.002);
+    EXPECT_LE(image::flip(rgb_of(*a), rgb_of(*b)), 0.002);
 }
 
 TEST(InstancePicturesGpu, StandAmongTheLevelsOfAClipmap) {
@@ -312,7 +305,7 @@ TEST(InstancePicturesGpu, StandAmongTheLevelsOfAClipmap) {
     for (size_t i = 0; i < a->depth.size(); ++i)
         off += !(a->depth[i] == b->depth[i] || std::fabs(a->depth[i] - b->depth[i]) <= 0.003f);
     EXPECT_LE(off, 60);
-    EXPECT_LE(image::flip(shown(*a), shown(*b)), 0.006);
+    EXPECT_LE(image::flip(rgb_of(*a), rgb_of(*b)), 0.006);
 }
 
 TEST_F(InstancesGpu, RefinedPointsAreTheSameOnHostAndDevice) {

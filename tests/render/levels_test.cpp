@@ -2,6 +2,7 @@
 // Clipmaps on the GPU: the same rays as on the CPU, the same texels after any history, and the picture of one level.
 
 #include "gpu_worlds.h"
+#include "rgb_of.h"
 
 #include "field/brick_set.h"
 #include "field/clipmap.h"
@@ -162,14 +163,6 @@ Frame seen_from(const Clipmap& map, vec3 eye, vec3 target) {
     return frame;
 }
 
-image::Rgb shown(const Picture& picture) {
-    image::Rgb out{picture.width, picture.height, {}};
-    for (size_t i = 0; i < picture.srgb.size(); ++i) {
-        if (i % 4 != 3) out.values.push_back(float(picture.srgb[i]) / 255);
-    }
-    return out;
-}
-
 TEST(LevelPicturesGpu, DrawWhatOneLevelDraws) {
     auto renderer = renderer_or_skip();
     if (!renderer) GTEST_SKIP();
@@ -190,7 +183,7 @@ TEST(LevelPicturesGpu, DrawWhatOneLevelDraws) {
             off += !(std::fabs(a->depth[i] - b->depth[i]) < (refine ? 0.005f : 0.05f) * a->depth[i]);
         }
         EXPECT_LE(off, 160) << "of " << a->depth.size() << ", refine " << refine;
-        EXPECT_LE(image::flip(shown(*a), shown(*b)), refine ? 0.01 : 0.05) << "refine " << refine;
+        EXPECT_LE(image::flip(rgb_of(*a), rgb_of(*b)), refine ? 0.01 : 0.05) << "refine " << refine;
     }
     EXPECT_EQ(renderer->stats().levels.size(), 5u);
     EXPECT_FALSE(renderer->render(levels, {.width = 16, .height = 16, .analytic = true}));
@@ -284,8 +277,8 @@ TEST(LevelPicturesGpu, NothingPopsOnADolly) {
         fresh.work();
         auto settled = renderer->render(seen_from(fresh, eye(frame), target), settings);
         ASSERT_TRUE(moving && settled);
-        for (const float e : image::flip_map(shown(*settled), shown(*moving))) worst = std::max(worst, e);
-        mean = std::max(mean, image::flip(shown(*settled), shown(*moving)));
+        for (const float e : image::flip_map(rgb_of(*settled), rgb_of(*moving))) worst = std::max(worst, e);
+        mean = std::max(mean, image::flip(rgb_of(*settled), rgb_of(*moving)));
     }
     EXPECT_GE(snaps, 1);
     EXPECT_LE(mean, 0.02);

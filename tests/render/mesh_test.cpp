@@ -2,6 +2,7 @@
 // Triangle meshes beside the field, under validation: where they meet, what they look like, what they shadow.
 #include "drawables.h"
 #include "gpu_worlds.h"
+#include "rgb_of.h"
 #include "image/metrics.h"
 #include "render/lib/pack.h"
 #include "render/lib/shadow_march.h"
@@ -41,14 +42,6 @@ Frame frame_with(const field::worlds::World& world) {
     Frame frame = frame_of(world, {0.6f, 1.0f, 3.6f});
     frame.materials[0] = frame.materials[1] = kClay;
     return frame;
-}
-
-image::Rgb rgb_of(const Picture& p) {
-    image::Rgb out;
-    out.width = p.width, out.height = p.height;
-    for (size_t i = 0; i < p.srgb.size(); i += 4)
-        for (size_t c = 0; c < 3; ++c) out.values.push_back(float(p.srgb[i + c]) / 255);
-    return out;
 }
 
 double angle_deg(const float* a, const float* b) {

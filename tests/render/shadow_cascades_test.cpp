@@ -2,6 +2,7 @@
 // Shadow maps of meshes: squares that hold what they must and move by whole texels; maps that keep their bits; pictures against those of the rays.
 #include "drawables.h"
 #include "gpu_worlds.h"
+#include "rgb_of.h"
 #include "image/metrics.h"
 #include "render/lib/pack.h"
 #include "render/passes/cascades.h"
@@ -126,7 +127,7 @@ struct ShadowMapsGpu : GpuTest {
     }
 };
 
-Frame hills() {
+Frame hills_in_the_sun() {
     Frame frame;
     frame.lights = {{.kind = Light::Kind::Directional, .direction = {0.4f, -1, 0.25f}}};
     const model::Surface grey = meshes::matte({0.6f, 0.6f, 0.6f});
@@ -143,7 +144,7 @@ Frame hills() {
 // Gate (sub-texel moves too): a moving camera changes at most a thousandth of the texels; where the snapped square is the same, none.
 TEST_F(ShadowMapsGpu, KeepTheirTexelsWhenTheCameraMoves) {
     constexpr int kSide = 256;
-    Frame frame = hills();
+    Frame frame = hills_in_the_sun();
     ShadowCascades before;
     const auto first = maps(frame, kSide, before);
     ASSERT_GE(first.size(), 3u);
@@ -265,13 +266,6 @@ TEST_F(ShadowCascadesGpu, LeaveNoGapBetweenMapsAndNoStripesOnAPlane) {
     EXPECT_LE(apart(rays, maps), 0.02);
 }
 
-image::Rgb shown(const Picture& p) {
-    image::Rgb out{p.width, p.height, {}};
-    for (size_t i = 0; i < p.srgb.size(); ++i)
-        if (i % 4 != 3) out.values.push_back(float(p.srgb[i]) / 255);
-    return out;
-}
-
 // Gate: where one map ends and the next begins, nothing of it is seen, in light or inside a shadow that reaches over all maps: pixels that rays
 // draw as flat as their neighbours are as flat, to one step of the screen's 255.
 TEST_F(ShadowCascadesGpu, BandsWhereMapsMeetHaveNoStep) {
@@ -344,7 +338,7 @@ TEST_F(ShadowCascadesGpu, ACasterOfTrianglesIsItsTwinOfTheField) {
                 rhi::must(renderer->render(frame, {.width = 96, .height = 72, .mesh_shadows = MeshShadows::Cascades}));
             EXPECT_EQ(renderer->stats().mesh_shadows, mesh ? "cascades" : "rays");
         }
-        const double flip = image::flip(shown(pictures[0]), shown(pictures[1]));
+        const double flip = image::flip(rgb_of(pictures[0]), rgb_of(pictures[1]));
         RecordProperty("flip", std::to_string(flip));
         EXPECT_LE(flip, 0.01) << sun;
     }

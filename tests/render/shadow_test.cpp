@@ -66,13 +66,13 @@ struct ShadowGpu : GpuTest {
     }
 };
 
-Edit box(vec3 low, vec3 high) {
+Edit box_of(vec3 low, vec3 high) {
     return field::worlds::edit(Box{.half_extents = (high - low) * 0.5f}, (low + high) * 0.5f);
 }
 
 field::worlds::World slab_with(const std::string& name, const Edit& edit, vec3 low, vec3 high) {
     return {name,
-            {box({low.x, -0.2f, low.z}, {high.x, 0, high.z}), edit},
+            {box_of({low.x, -0.2f, low.z}, {high.x, 0, high.z}), edit},
             {.voxel_size = kVoxel, .bounds = {{low.x, -0.2f, low.z}, high}}};
 }
 
@@ -104,7 +104,7 @@ TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
     // The cone is 2.5, 5 and 17 voxels wide at the edge; the last solid has cells without bricks inside.
     for (const auto& [h, thickness] :
          {std::pair{0.5f, 0.06f}, std::pair{1.0f, 0.06f}, std::pair{2.0f, 0.06f}, std::pair{2.0f, 0.8f}}) {
-        const auto world = slab_with("plate", box({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
+        const auto world = slab_with("plate", box_of({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
                                      {1.2f, h + thickness + 0.14f, 0.9f});
         std::vector<float> places;
         std::vector<double> expected;
@@ -123,7 +123,7 @@ TEST_F(ShadowGpu, AnEdgeHidesItsShareOfTheDisc) {
 TEST_F(ShadowGpu, HalfShadowsAreAsWideAsTheLightMakesThem) {
     for (const float h : {0.5f, 1.0f, 2.0f}) {
         const float thickness = 0.06f;
-        const auto world = slab_with("plate", box({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
+        const auto world = slab_with("plate", box_of({-1.2f, h, -0.9f}, {0, h + thickness, 0.9f}), {-1.2f, 0, -0.9f},
                                      {1.2f, h + 0.2f, 0.9f});
         std::vector<float> places;
         std::vector<float> expected;

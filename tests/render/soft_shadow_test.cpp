@@ -13,8 +13,8 @@ using kiln::vec3;
 
 namespace {
 
-constexpr float kKnown = 1e30f;                         // fields that tell every distance
-constexpr float kLightHeight = 5, kLightRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
+constexpr float kKnown = 1e30f;                       // fields that tell every distance
+constexpr float kSoftHeight = 5, kSoftRadius = 0.5f;  // a horizontal disc above the origin of the plane y = 0
 
 float box_distance(vec3 p, vec3 lo, vec3 hi) {
     const vec3 q{std::fabs(p.x - 0.5f * (lo.x + hi.x)) - 0.5f * (hi.x - lo.x),
@@ -41,13 +41,13 @@ auto leaning_block(float h) {
     };
 }
 
-// Visible fraction from (x, 0, 0) of the disc around (0, kLightHeight, 0), as the renderer asks for it.
+// Visible fraction from (x, 0, 0) of the disc around (0, kSoftHeight, 0), as the renderer asks for it.
 template <typename Field>
 float visible_from(const Field& field, float x) {
-    const vec3 to_light{-x, kLightHeight, 0};
+    const vec3 to_light{-x, kSoftHeight, 0};
     const float distance = length(to_light);
     SoftShadow shadow{field};
-    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance,
+    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kSoftRadius / distance,
                                  {1e-3f, distance, 1e-4f, kKnown, 256});
 }
 
@@ -72,7 +72,7 @@ TEST(SoftShadow, HalfPlaneHidesItsShareOfTheDisc) {
         EXPECT_NEAR(SoftShadow{leaning_block(1)}.disc_visible(float(offset)), visible, 1e-5);
         for (const float h : {0.5f, 1.0f, 2.5f}) {
             // The ray to the light's centre passes the edge's height at x (1 - h/D); a disc radius is R h / D there.
-            const float x = float(offset) * kLightRadius * h / (kLightHeight - h);
+            const float x = float(offset) * kSoftRadius * h / (kSoftHeight - h);
             EXPECT_NEAR(visible_from(leaning_block(h), x), visible, 0.02)
                 << "block, edge at " << offset << ", height " << h;
             for (const float thickness : {0.02f, 0.005f}) {
@@ -91,7 +91,7 @@ TEST(SoftShadow, PenumbraIsAsWideAsTheLightMakesIt) {
         (0.5 + (mid * std::sqrt(1 - mid * mid) + std::asin(mid)) / std::numbers::pi < 0.95 ? lo : hi) = mid;
     }
     for (const float h : {1.0f, 2.5f}) {
-        const double whole = 2 * kLightRadius * h / (kLightHeight - h);
+        const double whole = 2 * kSoftRadius * h / (kSoftHeight - h);
         const auto field = leaning_block(h);
         const double width = (place_of(field, 0.95f, float(whole)) - place_of(field, 0.05f, float(whole))) / lo;
         EXPECT_NEAR(width, whole, 0.05 * whole) << "edge at height " << h;
@@ -133,7 +133,7 @@ TEST(SoftShadow, HardShadowEndsAtTheProjectedEdge) {
     const auto field = half_plane(1, 0.02f);
     for (float x = -0.5f; x <= 0.5f; x += 0.01f) {
         if (std::fabs(x) < 0.004f) continue;
-        const vec3 to_light{-x, kLightHeight, 0};
+        const vec3 to_light{-x, kSoftHeight, 0};
         SoftShadow shadow{field};
         const float seen =
             shadow.shadow_visible({x, 0, 0}, normalize(to_light), 0, {1e-3f, length(to_light), 1e-4f, kKnown, 256});
@@ -161,7 +161,7 @@ TEST(SoftShadow, AWireHidesAStrip) {
     };
     SoftShadow shadow{wire};
     for (float x = -0.5f; x <= 0.5f; x += 0.01f) {
-        const float middle = x * (1 - h / kLightHeight), cone = kLightRadius * h / kLightHeight;
+        const float middle = x * (1 - h / kSoftHeight), cone = kSoftRadius * h / kSoftHeight;
         const double hidden =
             shadow.disc_visible((middle + half_width) / cone) - shadow.disc_visible((middle - half_width) / cone);
         EXPECT_NEAR(visible_from(wire, x), 1 - hidden, 0.02) << x;
@@ -174,14 +174,14 @@ TEST(SoftShadow, BandsNarrowerThanTheConeDoNotNarrowThePenumbra) {
                                   {0.5, 0.80450},   {0.75, 0.9279},  {0.9, 0.9813},   {1, 1}};
     for (const float h : {1.0f, 2.5f, 4.0f}) {
         for (const float share : {0.95f, 0.8f, 0.5f, 0.25f, 0.12f}) {  // of the cone's radius where the edge is
-            const float band = share * kLightRadius * h / kLightHeight;
+            const float band = share * kSoftRadius * h / kSoftHeight;
             for (const auto& [offset, visible] : expected) {
-                const float x = float(offset) * kLightRadius * h / (kLightHeight - h);
-                const vec3 to_light{-x, kLightHeight, 0};
+                const float x = float(offset) * kSoftRadius * h / (kSoftHeight - h);
+                const vec3 to_light{-x, kSoftHeight, 0};
                 const float distance = length(to_light);
                 const auto seen = [&](const auto& field) {
                     SoftShadow shadow{field, band};
-                    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kLightRadius / distance,
+                    return shadow.shadow_visible({x, 0, 0}, normalize(to_light), kSoftRadius / distance,
                                                  {1e-3f, distance, 1e-4f, band, 512});
                 };
                 const double most = std::fabs(offset) > 0.7 ? 0.035 : 0.02;  // of the rim the last 3 % may go unseen

@@ -12,7 +12,7 @@ using namespace kiln::render::shade;
 using kiln::vec3;
 
 namespace {
-const uint kAll[] = {kToneMapNone, kToneMapExponential, kToneMapAces, kToneMapNeutral, kToneMapAgx};
+const uint kAllCurves[] = {kToneMapNone, kToneMapExponential, kToneMapAces, kToneMapNeutral, kToneMapAgx};
 }
 
 // Gate G20.
@@ -52,7 +52,7 @@ TEST(ToneMap, NeutralKeepsBaseColorsBelowItsShoulder) {
 }
 
 TEST(ToneMap, IsMonotoneAndContinuousOnGreys) {
-    for (const uint kind : kAll) {
+    for (const uint kind : kAllCurves) {
         double before = -1;
         for (double e = -10; e <= 10; e += 0.001) {
             const float x = float(std::exp2(e));
@@ -70,7 +70,7 @@ TEST(ToneMap, IsMonotoneAndContinuousOnGreys) {
 TEST(ToneMap, StaysInGamutForAnyLight) {
     const float inf = std::numeric_limits<float>::infinity(), nan = std::numeric_limits<float>::quiet_NaN();
     const float values[] = {-inf, -1, 0, 1e-30f, 1e-4f, 0.05f, 0.5f, 0.8f, 1, 10, 1e4f, 65504, 1e20f, 3e38f, inf, nan};
-    for (const uint kind : kAll) {
+    for (const uint kind : kAllCurves) {
         for (const float r : values) {
             for (const float g : values) {
                 for (const float b : values) {

@@ -28,7 +28,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-World world_of(const std::string& json) {
+World world_with(const std::string& json) {
     auto world = World::parse(json, "test.kiln.json");
     EXPECT_TRUE(world) << (world ? "" : world.error().message);
     return world ? std::move(*world) : World();
@@ -168,7 +168,7 @@ TEST(WorldMesh, NothingSolidIsAnErrorThatSaysSo) {
 }
 
 TEST(WorldMesh, SeamsAreTheirOwnPartsAndColoursFollowTheBlend) {
-    const Mesh mesh = mesh_of(world_of(kSeam));
+    const Mesh mesh = mesh_of(world_with(kSeam));
     expect_closed(mesh, "seam");
     std::map<std::pair<std::string, bool>, int> parts;
     for (const MeshPart& part : mesh.parts) ++parts[{part.name, part.blended}];
@@ -192,7 +192,7 @@ TEST(WorldMesh, SeamsAreTheirOwnPartsAndColoursFollowTheBlend) {
 }
 
 TEST(WorldMesh, SimplifiedWorldsStayClosed) {
-    const World world = world_of(kSeam);
+    const World world = world_with(kSeam);
     const Mesh whole = mesh_of(world), tenth = mesh_of(world, {.simplify_share = 0.1f}),
                near = mesh_of(world, {.simplify_error = 0.002f});
     expect_closed(tenth, "a tenth");
@@ -286,14 +286,14 @@ void check_glb(const std::string& bytes, const Mesh& mesh) {
 
 TEST_F(MeshFile, GlbHoldsTheMeshWithValidAccessors) {
     for (const bool sharp : {false, true}) {
-        const Mesh mesh = mesh_of(world_of(kSeam), {.sharp = sharp});
+        const Mesh mesh = mesh_of(world_with(kSeam), {.sharp = sharp});
         ASSERT_TRUE(mesh.save(folder_ / "a.glb"));
         check_glb(read(folder_ / "a.glb"), mesh);
     }
 }
 
 TEST_F(MeshFile, ObjHasPositiveIndicesOneVertexAPositionAndItsMaterials) {
-    const Mesh mesh = mesh_of(world_of(kSeam));
+    const Mesh mesh = mesh_of(world_with(kSeam));
     ASSERT_TRUE(mesh.save(folder_ / "a.obj"));
     std::istringstream in(read(folder_ / "a.obj"));
     std::string line;
@@ -337,7 +337,7 @@ TEST_F(MeshFile, ObjHasPositiveIndicesOneVertexAPositionAndItsMaterials) {
 }
 
 TEST_F(MeshFile, StlHoldsEveryTriangleAndItsNormal) {
-    const Mesh mesh = mesh_of(world_of(kSeam), {.sharp = true});
+    const Mesh mesh = mesh_of(world_with(kSeam), {.sharp = true});
     ASSERT_TRUE(mesh.save(folder_ / "a.stl"));
     const std::string bytes = read(folder_ / "a.stl");
     const size_t count = at<uint32_t>(bytes, 80);
@@ -356,7 +356,7 @@ TEST_F(MeshFile, StlHoldsEveryTriangleAndItsNormal) {
 }
 
 TEST_F(MeshFile, PlyHoldsVerticesColoursAndFaces) {
-    const Mesh mesh = mesh_of(world_of(kSeam));
+    const Mesh mesh = mesh_of(world_with(kSeam));
     ASSERT_TRUE(mesh.save(folder_ / "a.ply"));
     const std::string bytes = read(folder_ / "a.ply");
     const size_t end = bytes.find("end_header\n");
@@ -379,7 +379,7 @@ TEST_F(MeshFile, PlyHoldsVerticesColoursAndFaces) {
 }
 
 TEST_F(MeshFile, UnwritableAndUnknownNamesLeaveNothingBehind) {
-    const Mesh mesh = mesh_of(world_of(kSeam), {.cell = 0.2f});
+    const Mesh mesh = mesh_of(world_with(kSeam), {.cell = 0.2f});
     EXPECT_EQ(mesh.save(folder_ / "none/a.glb").error().kind, ErrorKind::Failed);
     EXPECT_EQ(mesh.save(folder_ / "a.fbx").error().kind, ErrorKind::Usage);
     EXPECT_EQ(mesh.save(folder_ / "glb").error().kind, ErrorKind::Usage);

@@ -234,7 +234,7 @@ TEST(Simulate, WhatCannotBeSimulatedIsOneClearError) {
 }
 
 // A pillar on the ground, cut through; its upper part leans over nothing and falls straight.
-constexpr const char* kPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
+constexpr const char* kCutPillar = R"({"format": 1, "field": {"voxel_size": 0.05},
   "edits": [
     {"id": "ground", "shape": "plane"},
     {"id": "pillar", "shape": "box", "half_extents": [0.3, 2, 0.3], "position": [0, 1.5, 0]},
@@ -246,7 +246,7 @@ const std::vector<TimedCommand> kCut = {
      1}};
 
 TEST(Simulate, APartCutLooseBecomesABodyThatFallsAndComesToRest) {
-    const World world = parsed(kPillar);
+    const World world = parsed(kCutPillar);
     for (const std::string& engine : engines()) {
         const json out = run(world, {.seconds = 4, .backend = engine, .edits = kCut});
         ASSERT_EQ(out["bodies"].size(), 2u) << engine;
@@ -267,7 +267,7 @@ TEST(Simulate, APartCutLooseBecomesABodyThatFallsAndComesToRest) {
 
 TEST(Simulate, WhatIsCutAgainIsCutFromWhatWasLeft) {
     // The stump is cut off too, below the part that lies on it: the part stays a body, and falls with it.
-    const World world = parsed(kPillar);
+    const World world = parsed(kCutPillar);
     std::vector<TimedCommand> twice = kCut;
     twice.push_back(
         {2.5, "cut",
@@ -284,7 +284,7 @@ TEST(Simulate, WhatIsCutAgainIsCutFromWhatWasLeft) {
 }
 
 TEST(Simulate, APartThatHasComeToRestIsGroundAgainAndCanBeCutAgain) {
-    const World world = parsed(kPillar);
+    const World world = parsed(kCutPillar);
     std::vector<TimedCommand> later = kCut;
     // Through the fallen part, which reaches from 1.6 m to 3.1 m now.
     later.push_back(
@@ -336,7 +336,7 @@ TEST(Simulate, AnEditThatEnclosesABodyNeitherShootsItNorStopsTheOthers) {
 }
 
 TEST(Simulate, ATriggerIsLeftByAPartThatIsABodyNoMore) {
-    json scene = json::parse(kPillar);
+    json scene = json::parse(kCutPillar);
     scene["objects"] = json::parse(R"({"gate": {"shape": "box", "half_extents": [0.5, 0.5, 0.5]}})");
     scene["triggers"] = json::parse(R"([{"id": "stump", "object": "gate", "position": [0, 1.6, 0]}])");
     const World world = parsed(scene.dump());

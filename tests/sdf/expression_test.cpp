@@ -113,13 +113,13 @@ TEST(Formula, EqualPartsAreOneNodeAndConstantsAreFolded) {
     EXPECT_EQ(parsed("min(x, x)").nodes.size(), 1u);
 }
 
-struct Wrong {
+struct WrongFormula {
     const char* text;
     const char* place;
     const char* what;
     const char* mend;
 };
-class EachWrongText : public testing::TestWithParam<Wrong> {};
+class EachWrongText : public testing::TestWithParam<WrongFormula> {};
 TEST_P(EachWrongText, IsAnErrorWithPlaceAndMend) {
     const auto formula = parse_formula(GetParam().text);
     ASSERT_FALSE(formula) << GetParam().text;
@@ -131,36 +131,46 @@ TEST_P(EachWrongText, IsAnErrorWithPlaceAndMend) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Formula, EachWrongText,
-    testing::Values(
-        Wrong{"", "1:1", "a value is missing before the end", "write one"},
-        Wrong{"x +", "1:4", "a value is missing before the end", "write one"},
-        Wrong{"x + * y", "1:5", "a value is missing before \"*\"", "write one"},
-        Wrong{"x\n  + q", "2:5", "there is no name \"q\"", "use x y z p pi"},
-        Wrong{"sine(x)", "1:1", "there is no function \"sine\"", "did you mean \"sin\"?"},
-        Wrong{"lenght(p) - 1", "1:1", "there is no function \"lenght\"", "did you mean \"length\"?"},
-        Wrong{"frobnicate(x)", "1:1", "there is no function \"frobnicate\"", "use abs sqrt"},
-        Wrong{"radius = 1; length(p) - radiu", "1:25", "there is no name \"radiu\"", "did you mean \"radius\"?"},
-        Wrong{"sin x", "1:4", "sin is a function", "in brackets"},
-        Wrong{"sin(x, y)", "1:1", "sin has 2 operands", "takes 1 operand"},
-        Wrong{"min(x)", "1:1", "min has 1 operand", "takes 2 or more"},
-        Wrong{"sin()", "1:5", "has no operands", "takes 1"}, Wrong{"(x + 1", "1:1", "not closed", "add \")\""},
-        Wrong{"x + 1)", "1:6", "no bracket is open", "take \")\" out"},
-        Wrong{"x, y", "1:2", "a comma outside", "take it out"},
-        Wrong{"(x, y)", "1:3", "a comma outside", "take it out"}, Wrong{"2x", "1:2", "follows a number", "write *"},
-        Wrong{"x y", "1:3", "is not an operator", "use + - * / ^"},
-        Wrong{"x % 2", "1:3", "is not an operator", "use + - * / ^"}, Wrong{"p", "1:1", "a vector of 3", "one number"},
-        Wrong{"p.w", "1:2", "no component", "use .x"}, Wrong{"x.y", "1:2", "of a number", "take it out"},
-        Wrong{"p.xy.z", "1:5", "vector of 2", "no such component"}, Wrong{"p.", "1:2", "follow a dot", "p.x"},
-        Wrong{"(p + vec2(1, 2)).x", "1:4", "a vector of 3 meets a vector of 2", "same size"},
-        Wrong{"vec3(p, 1, 2).x", "1:6", "made of numbers", "one component"},
-        Wrong{"1/0", "1:2", "no finite number", "change"}, Wrong{"x/0", "1:2", "no finite number", "change"},
-        Wrong{"1e40", "1:1", "out of range", "below 1e30"}, Wrong{"1e20 * 1e20", "1:6", "no finite number", "change"},
-        Wrong{"a = 1;", "1:7", "missing", "write one"}, Wrong{"a = 1", "1:6", "nothing follows", "end it with"},
-        Wrong{"x = 1; x", "1:1", "has a meaning", "choose another"},
-        Wrong{"a = 1; a = 2; a", "1:8", "has a meaning", "choose another"},
-        Wrong{"x; y", "1:2", "stands alone", "name"}, Wrong{"cross(p.xy, p).x", "1:1", "two vectors of 3", "vec3"},
-        Wrong{"é", "1:1", "a value is missing before \"é\"", "write one"},
-        Wrong{"1 + é", "1:5", "a value is missing", "write one"}, Wrong{"x ? 1", "1:3", "is not an operator", "use"}));
+    testing::Values(WrongFormula{"", "1:1", "a value is missing before the end", "write one"},
+                    WrongFormula{"x +", "1:4", "a value is missing before the end", "write one"},
+                    WrongFormula{"x + * y", "1:5", "a value is missing before \"*\"", "write one"},
+                    WrongFormula{"x\n  + q", "2:5", "there is no name \"q\"", "use x y z p pi"},
+                    WrongFormula{"sine(x)", "1:1", "there is no function \"sine\"", "did you mean \"sin\"?"},
+                    WrongFormula{"lenght(p) - 1", "1:1", "there is no function \"lenght\"", "did you mean \"length\"?"},
+                    WrongFormula{"frobnicate(x)", "1:1", "there is no function \"frobnicate\"", "use abs sqrt"},
+                    WrongFormula{"radius = 1; length(p) - radiu", "1:25", "there is no name \"radiu\"",
+                                 "did you mean \"radius\"?"},
+                    WrongFormula{"sin x", "1:4", "sin is a function", "in brackets"},
+                    WrongFormula{"sin(x, y)", "1:1", "sin has 2 operands", "takes 1 operand"},
+                    WrongFormula{"min(x)", "1:1", "min has 1 operand", "takes 2 or more"},
+                    WrongFormula{"sin()", "1:5", "has no operands", "takes 1"},
+                    WrongFormula{"(x + 1", "1:1", "not closed", "add \")\""},
+                    WrongFormula{"x + 1)", "1:6", "no bracket is open", "take \")\" out"},
+                    WrongFormula{"x, y", "1:2", "a comma outside", "take it out"},
+                    WrongFormula{"(x, y)", "1:3", "a comma outside", "take it out"},
+                    WrongFormula{"2x", "1:2", "follows a number", "write *"},
+                    WrongFormula{"x y", "1:3", "is not an operator", "use + - * / ^"},
+                    WrongFormula{"x % 2", "1:3", "is not an operator", "use + - * / ^"},
+                    WrongFormula{"p", "1:1", "a vector of 3", "one number"},
+                    WrongFormula{"p.w", "1:2", "no component", "use .x"},
+                    WrongFormula{"x.y", "1:2", "of a number", "take it out"},
+                    WrongFormula{"p.xy.z", "1:5", "vector of 2", "no such component"},
+                    WrongFormula{"p.", "1:2", "follow a dot", "p.x"},
+                    WrongFormula{"(p + vec2(1, 2)).x", "1:4", "a vector of 3 meets a vector of 2", "same size"},
+                    WrongFormula{"vec3(p, 1, 2).x", "1:6", "made of numbers", "one component"},
+                    WrongFormula{"1/0", "1:2", "no finite number", "change"},
+                    WrongFormula{"x/0", "1:2", "no finite number", "change"},
+                    WrongFormula{"1e40", "1:1", "out of range", "below 1e30"},
+                    WrongFormula{"1e20 * 1e20", "1:6", "no finite number", "change"},
+                    WrongFormula{"a = 1;", "1:7", "missing", "write one"},
+                    WrongFormula{"a = 1", "1:6", "nothing follows", "end it with"},
+                    WrongFormula{"x = 1; x", "1:1", "has a meaning", "choose another"},
+                    WrongFormula{"a = 1; a = 2; a", "1:8", "has a meaning", "choose another"},
+                    WrongFormula{"x; y", "1:2", "stands alone", "name"},
+                    WrongFormula{"cross(p.xy, p).x", "1:1", "two vectors of 3", "vec3"},
+                    WrongFormula{"é", "1:1", "a value is missing before \"é\"", "write one"},
+                    WrongFormula{"1 + é", "1:5", "a value is missing", "write one"},
+                    WrongFormula{"x ? 1", "1:3", "is not an operator", "use"}));
 
 TEST(Formula, NestingIsLimitedByMemoryOnly) {
     const size_t deep = 100000;
@@ -239,7 +249,7 @@ TEST(Model, OrderOfLinesAndNamesDoNotMatterBeyondTheLast) {
     EXPECT_EQ(evaluate(*model, {3, 0, 0}), -3);
 }
 
-class EachWrongModel : public testing::TestWithParam<Wrong> {};
+class EachWrongModel : public testing::TestWithParam<WrongFormula> {};
 TEST_P(EachWrongModel, IsAnErrorWithPlaceAndMend) {
     const auto model = read_vm(GetParam().text);
     ASSERT_FALSE(model) << GetParam().text;
@@ -250,20 +260,20 @@ TEST_P(EachWrongModel, IsAnErrorWithPlaceAndMend) {
 }
 INSTANTIATE_TEST_SUITE_P(
     Model, EachWrongModel,
-    testing::Values(Wrong{"", "1:1", "no operation", "write lines"},
-                    Wrong{"# only this\n", "1:1", "no operation", "write lines"},
-                    Wrong{"_0 var-x\n_1", "2:3", "\"_1\" has no operation", "write"},
-                    Wrong{"_0 frob", "1:4", "no operation \"frob\"", "use one of"},
-                    Wrong{"_0 var-x\n_1 squre _0", "2:4", "no operation \"squre\"", "did you mean \"square\"?"},
-                    Wrong{"_0 var-x\n_1 add _0", "2:10", "add takes 2 operands, here are 1", "2 operands"},
-                    Wrong{"_0 var-x\n_1 neg _0 _0", "2:11", "neg takes 1 operand, here are 2", "1 operand"},
-                    Wrong{"_0 add _1 _2", "1:8", "no value \"_1\" above", "lines before"},
-                    Wrong{"_0 var-x\n_0 var-y", "2:1", "named twice", "another name"},
-                    Wrong{"_0 const x", "1:10", "no number", "write"},
-                    Wrong{"_0 const 1e39", "1:10", "no number below", "write"},
-                    Wrong{"_0 const 0\n_1 const 1\n_2 div _1 _0", "3:1", "no finite", "change"},
-                    Wrong{"_0 var-x 3", "1:10", "takes 0 operands", "0"},
-                    Wrong{"_0 var-x\n_1 max _0 _0 _0 _0", "2:14", "more than 2", "takes 2"}));
+    testing::Values(WrongFormula{"", "1:1", "no operation", "write lines"},
+                    WrongFormula{"# only this\n", "1:1", "no operation", "write lines"},
+                    WrongFormula{"_0 var-x\n_1", "2:3", "\"_1\" has no operation", "write"},
+                    WrongFormula{"_0 frob", "1:4", "no operation \"frob\"", "use one of"},
+                    WrongFormula{"_0 var-x\n_1 squre _0", "2:4", "no operation \"squre\"", "did you mean \"square\"?"},
+                    WrongFormula{"_0 var-x\n_1 add _0", "2:10", "add takes 2 operands, here are 1", "2 operands"},
+                    WrongFormula{"_0 var-x\n_1 neg _0 _0", "2:11", "neg takes 1 operand, here are 2", "1 operand"},
+                    WrongFormula{"_0 add _1 _2", "1:8", "no value \"_1\" above", "lines before"},
+                    WrongFormula{"_0 var-x\n_0 var-y", "2:1", "named twice", "another name"},
+                    WrongFormula{"_0 const x", "1:10", "no number", "write"},
+                    WrongFormula{"_0 const 1e39", "1:10", "no number below", "write"},
+                    WrongFormula{"_0 const 0\n_1 const 1\n_2 div _1 _0", "3:1", "no finite", "change"},
+                    WrongFormula{"_0 var-x 3", "1:10", "takes 0 operands", "0"},
+                    WrongFormula{"_0 var-x\n_1 max _0 _0 _0 _0", "2:14", "more than 2", "takes 2"}));
 
 TEST(Model, AnyBytesAreReadOrRefusedWithAPlace) {
     const std::string start = "_0 const 2.95\n_1 var-x\n_2 mul _1 _0\n_3 sqrt _2\n_4 max _3 _1\n# note\n_5 sub _4 _0\n";
