@@ -30,6 +30,7 @@ struct dvec3 {
     friend bool operator==(const dvec3&, const dvec3&) = default;
 };
 
+/// The same place or direction, in double precision.
 constexpr dvec3 wide(vec3 a) { return {a.x, a.y, a.z}; }
 
 /// Rotation, (x, y, z, w) with w the scalar part; unit length.

@@ -27,8 +27,8 @@ class Simulation;
 }
 
 struct FieldSettings {
-    float voxel_size =
-        0;  ///< metres; 0: longest finite side / 256 when the field is made; edits that change it by less than 10 % keep it
+    /// Metres; 0: longest finite side / 256 when the field is made, kept while edits change that by less than 10 %.
+    float voxel_size = 0;
     int cells = 64;  ///< a side per level, a power of two (clipmap levels; one level covers the edits)
     int levels = 1;
     std::optional<Box3> bounds;  ///< none: the finite edits', inflated by 10 %, and their blends with a ground

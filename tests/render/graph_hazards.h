@@ -15,6 +15,7 @@ namespace kiln::render::samples {
 // read that were lost, wrong states left, transients overlapping in memory and time.
 std::vector<std::string> find_hazards(std::span<const Plan> frames);
 
+// Sentences as lines: empty where nothing is wrong.
 inline std::string joined(const std::vector<std::string>& lines) {
     std::string out;
     for (const std::string& l : lines) out += l + "\n";
