@@ -85,14 +85,15 @@ public:
             if (cells > kUnsortedCells) {
                 build_tasks(all);
             } else if (cells > 0) {
-                results_.resize(dirty_.size());
+                const std::vector<CellBox> boxes = few_boxes();
+                results_.resize(boxes.size());
                 CellMaker maker = this->maker();
                 StillTexels still(*program_, lattice(), reached_);
-                for (size_t i = 0; i < dirty_.size(); ++i) {
-                    TaskSink sink{*this, {}, results_[i], std::span(dirty_).first(i), {}, was_reached_, &still, false};
+                for (size_t i = 0; i < boxes.size(); ++i) {
+                    TaskSink sink{*this, {}, results_[i], std::span(boxes).first(i), dirty_, was_reached_, &still, false};
                     results_[i].leaves.reserve(kFewLeaves);
                     results_[i].code.reserve(kFewLeaves * 16);
-                    maker.run_box(dirty_[i], sink);
+                    maker.run_box(boxes[i], sink);
                 }
                 count(maker, results_[0]);
             }
@@ -110,24 +111,20 @@ private:
         ivec3 task;
         TaskResult& result;
         std::span<const CellBox> earlier = {};  // an update of few cells: boxes that have had their cells
-        std::span<const CellBox> dirty = {};    // else: those that meet the task
+        std::span<const CellBox> dirty = {};    // where edits changed; in a task, those that meet it
         std::span<const CellBox> gone = {};     // where edits were that are gone, of those that may meet the task
         StillTexels* still = nullptr;           // of an update of few cells
         bool saw_rows = false;                  // still has those of the box at hand
 
         bool whole() const { return builder.old_ == nullptr; }
         bool wants(const CellBox& box) const {
-            return whole() || earlier.data() != nullptr ||
-                   std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
+            return whole() || std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
         }
         bool wants(ivec3 cell) const {
             if (whole()) return true;
             const auto has_cell = [&](const CellBox& b) { return contains(b, cell); };
-            if (earlier.data() != nullptr) {
-                if (std::any_of(earlier.begin(), earlier.end(), has_cell)) return false;
-            } else if (std::none_of(dirty.begin(), dirty.end(), has_cell)) {
-                return false;
-            }
+            if (std::any_of(earlier.begin(), earlier.end(), has_cell)) return false;
+            if (std::none_of(dirty.begin(), dirty.end(), has_cell)) return false;
             const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
             if ((word & kCellOccupied) != 0) {
                 builder.ask_for(word & kCellSlotMask);
@@ -304,6 +301,26 @@ private:
         }
         std::sort(removed_.begin(), removed_.end());
         std::sort(inserted_.begin(), inserted_.end());
+    }
+
+    // The dirty boxes, those joined that hold fewer cells together than each by itself: where an edit was and where it has gone to mostly overlap.
+    std::vector<CellBox> few_boxes() const {
+        const auto cells = [](const CellBox& box) {
+            const ivec3 s = box.max - box.min;
+            return int64_t(s.x) * s.y * s.z;
+        };
+        std::vector<CellBox> out;
+        for (const CellBox& box : dirty_) {
+            const auto near = std::find_if(out.begin(), out.end(), [&](const CellBox& other) {
+                return cells(joined(other, box)) <= cells(other) + cells(box);
+            });
+            if (near != out.end()) {
+                *near = joined(*near, box);
+            } else {
+                out.push_back(box);
+            }
+        }
+        return out;
     }
 
     bool is_dirty(const CellBox& box) const {
