@@ -90,7 +90,8 @@ public:
                 CellMaker maker = this->maker();
                 StillTexels still(*program_, lattice(), reached_);
                 for (size_t i = 0; i < boxes.size(); ++i) {
-                    TaskSink sink{*this, {}, results_[i], std::span(boxes).first(i), dirty_, was_reached_, &still, false};
+                    TaskSink sink{*this,  {},           results_[i], std::span(boxes).first(i),
+                                  dirty_, was_reached_, &still,      false};
                     results_[i].leaves.reserve(kFewLeaves);
                     results_[i].code.reserve(kFewLeaves * 16);
                     maker.run_box(boxes[i], sink);

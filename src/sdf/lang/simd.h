@@ -3,7 +3,12 @@
 // Included inside a namespace; <immintrin.h>, <cmath> and <cstdint> must have been included outside. No include guard, as scalar.h.
 // Every operation rounds once and in the same order as the scalar text, so all widths give the same bytes.
 
+// All one function, but where each of its variables on the stack is watched: each instruction of a tape would mark those of all shapes.
+#if defined(__SANITIZE_ADDRESS__)
+#define KILN_SDF [[maybe_unused]] static inline
+#else
 #define KILN_SDF [[maybe_unused]] static inline __attribute__((always_inline))
+#endif
 #define KILN_C(x) param(x)
 
 using param = float;
