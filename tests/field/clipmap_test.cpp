@@ -61,11 +61,12 @@ TEST(Clipmap, AWalkOf100MetresAndBackReproducesTheSameBytes) {
     Clipmap map = made(program, {0, 0.5, 0}, kSmall);
     map.work();
     const Clipmap before = map;
-    for (double x = 0; x <= 100; x += 2.5) {
+    const double far = rounds(100);
+    for (double x = 0; x <= far; x += 2.5) {
         map.move({x, 0.5, 0.3 * x});
         map.work({.bricks = 700});
     }
-    for (double x = 100; x >= 0; x -= 2.5) {
+    for (double x = far; x >= 0; x -= 2.5) {
         map.move({x, 0.5, 0.3 * x});
         map.work({.bricks = 700});
     }

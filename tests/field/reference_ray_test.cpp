@@ -4,6 +4,7 @@
 
 #include "field/reference_ray.h"
 #include "twenty_worlds.h"
+#include "rounds.h"
 
 #include <cmath>
 
@@ -127,7 +128,7 @@ void expect_agreement(int rays_half, int rays_snorm8) {
     testing::Test::RecordProperty("tangent", tangent);
 }
 
-TEST(ReferenceRay, MarchAgreesWithBisectionOnEveryWorld) { expect_agreement(12000, 3000); }
+TEST(ReferenceRay, MarchAgreesWithBisectionOnEveryWorld) { expect_agreement(rounds(12000), rounds(3000)); }
 
 TEST(ReferenceRaySlow, MarchAgreesWithBisectionOnAHundredThousandRaysOfEachWorld) { expect_agreement(100000, 20000); }
 

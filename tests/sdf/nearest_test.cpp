@@ -6,6 +6,7 @@
 
 #include "sdf/judge.h"
 #include "sdf/regions.h"
+#include "rounds.h"
 
 #include <kiln/shapes.h>
 
@@ -99,7 +100,7 @@ void expect_true_distances(const Judged& scene, int points, float extent, unsign
     const Regions regions(scene.program);
     std::mt19937 random(seed);
     std::uniform_real_distribution<double> at(-extent, extent);
-    for (int i = 0; i < points; ++i) {
+    for (int i = 0; i < rounds(points); ++i) {
         const dvec3 p{at(random), at(random), at(random)};
         const Nearest n = nearest_surface(regions, p, std::numeric_limits<double>::infinity(), kTolerance);
         ASSERT_TRUE(n.found);

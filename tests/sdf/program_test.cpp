@@ -6,6 +6,7 @@
 #include "sdf/prune.h"
 #include "random_scenes.h"
 #include "sdf/tables.h"
+#include "rounds.h"
 
 #include <kiln/shapes.h>
 
@@ -39,7 +40,7 @@ TEST(Program, WorldDistanceIsOneLipschitz) {
         const auto program = compile(s.source());
         ASSERT_TRUE(program) << seed << program.error().message;
         Random r(2000 + seed);
-        for (int i = 0; i < 2000; ++i) {
+        for (int i = 0; i < rounds(2000); ++i) {
             const vec3 p = r.point(i % 4 == 0 ? 20.0f : 4.0f);
             const vec3 q = p + r.point(i % 2 == 0 ? 0.05f : 1.0f);
             const double gap = std::sqrt(double(dot(p - q, p - q)));
