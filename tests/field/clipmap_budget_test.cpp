@@ -2,6 +2,7 @@
 // Starts threads.
 // Clipmaps against their budgets: of bricks and of time, and of room in the pool.
 #include "clipmaps.h"
+#include "rounds.h"
 
 #include <algorithm>
 #include <cmath>
@@ -34,17 +35,20 @@ TEST(Clipmap, KeepsToItsBudgetAndIsWholeAtOnceAfterATeleport) {
             }
         }
         ASSERT_LE(baked(map), budget) << "frame " << frame;
-        ASSERT_EQ(holes(map), 0) << "the picture has a hole in frame " << frame;
+        const bool looks = !kSanitized || frame % 4 == 0;
+        if (looks) {
+            ASSERT_EQ(holes(map), 0) << "the picture has a hole in frame " << frame;
+        }
         if (frame < 120 && frame % 60 == 58) sharp += map.counts(0).missing_cells == 0;
         if (map.shown_levels() > 4) {
             ++nets;
             // No ray down ends in nothing.
-            for (int i = 0; i < 100; ++i, ++rays) {
+            for (int i = 0; i < rounds(100); ++i, ++rays) {
                 const dvec3 from{at.x + double(r.in(-20, 20)), 15, at.z + double(r.in(-20, 20))};
                 ASSERT_NE(map.cast(from, normalize(vec3{r.in(-0.3f, 0.3f), -1, r.in(-0.3f, 0.3f)}), 1e6).state,
                           kMarchMiss);
             }
-        } else {
+        } else if (looks) {
             for (uint32_t slot = 0; slot < map.slot_count(); ++slot) ASSERT_LT(map.records()[slot].level, 4u);
         }
         if (frame % 20 == 3) {

@@ -21,7 +21,7 @@ TEST(Clipmap, WhatIsNearIsMadeFirst) {
     int looked = 0;
     for (int frame = 0; frame < 200 && !map.work({.bricks = 500}); ++frame) {
         for (int level = 0; level < 3; ++level) {
-            if (map.counts(level).missing_cells == 0) continue;
+            if (map.counts(level).missing_cells == 0 || (kSanitized && frame % 4 != 1)) continue;
             const double side = double(map.voxel_size(level)) * kBrickVoxels;
             double made_away = 0, missing_away = 0;
             int made_cells = 0, missing_cells = 0;
@@ -37,7 +37,7 @@ TEST(Clipmap, WhatIsNearIsMadeFirst) {
             ++looked;
         }
     }
-    EXPECT_GT(looked, 5);
+    EXPECT_GT(looked, rounds(5));
 }
 
 // Where rays of a picture end.

@@ -136,7 +136,7 @@ TEST(ReferenceRaySlow, MarchAgreesWithBisectionOnAHundredThousandRaysOfEachWorld
 TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {
     worlds::Random r(3);
     int roots = 0;
-    for (int i = 0; i < 200000; ++i) {
+    for (int i = 0; i < rounds(200000); ++i) {
         Cubic c{r.in(0, 1), r.in(-1, 1), r.in(-1, 1), r.in(-1, 1)};
         const int kind = r.below(6);
         if (kind == 0) c.b3 = c.b2 = c.b1;                                                        // flat end
@@ -176,7 +176,7 @@ TEST(ReferenceRay, CubicFindsTheFirstRootOrNone) {
         ASSERT_LT(std::fabs(at(got)), 2e-6) << got << " is no root; " << expected << " is";
         ASSERT_LT(got, expected + 1e-3);
     }
-    EXPECT_GT(roots, 50000);
+    EXPECT_GT(roots, rounds(50000));
 }
 
 TEST(ReferenceRay, CubicIsTheTrilinearValueAlongTheSegment) {

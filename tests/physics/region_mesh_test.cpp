@@ -125,7 +125,8 @@ private:
 
 TEST(RegionMesh, NoiseIsClosedToo) {
     const field::MeshFacts facts = welded(Noise(kSanitized ? 20 : 40)).facts();
-    EXPECT_GT(facts.triangles, kSanitized ? 60000u : 500000u);  // all 256 cases, thousands of times, also where eight regions meet
+    EXPECT_GT(facts.triangles,
+              kSanitized ? 60000u : 500000u);  // all 256 cases, thousands of times, also where eight regions meet
     EXPECT_EQ(facts.open_edges, 0u);
     EXPECT_EQ(facts.non_manifold_edges, 0u);
 }
