@@ -92,7 +92,9 @@ TEST(Clipmap, WhatIsSeenIsMadeFirstAndInTheEndNothingDiffers) {
         return bricks;
     };
     const uint32_t first = bricks_until_seen(view), without = bricks_until_seen({});
-    EXPECT_LT(2 * first, without) << first << " bricks, " << without << " in an order that knows no view";
+    // Of smaller windows a view shows more.
+    EXPECT_LT((kSanitized ? 1 : 2) * first, without)
+        << first << " bricks, " << without << " in an order that knows no view";
 }
 
 TEST(Clipmap, OlderChangesShowFirstAndEachOnlyWhole) {
