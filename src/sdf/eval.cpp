@@ -35,7 +35,8 @@ bool processor_has(Isa isa) {
     case Isa::Sse4:
         return __builtin_cpu_supports("sse4.1") != 0;
     case Isa::Avx2:
-        return __builtin_cpu_supports("avx2") != 0;
+        return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0 &&
+               __builtin_cpu_supports("f16c") != 0;
     case Isa::Avx512:
         return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
                __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;

@@ -42,6 +42,11 @@ static inline void store_half_words(uint16_t* to, lane_f v) {
     const __m256i words = _mm512_maskz_cvtps_ph(0xffff, __m512(v), _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC);
     __builtin_memcpy(to, &words, sizeof words);
 }
+static inline lane_f load_half_words(const uint16_t* from) {
+    __m256i words;
+    __builtin_memcpy(&words, from, sizeof words);
+    return lane_f(_mm512_maskz_cvtph_ps(0xffff, words));
+}
 #include "sdf/eval_list.inl"
 #include "sdf/expression_run.inl"
 }  // namespace kiln::sdf::avx512

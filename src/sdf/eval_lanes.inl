@@ -146,24 +146,26 @@ static __attribute__((noinline)) void step(Registers& r, uint32_t word, const fl
     }
 }
 
-#ifdef KILN_FEW
-// Both instructions of a leaf that is_fused_leaf(), where `code` begins with PointTranslate and is one.
-static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const float* params) {
-    const uint32_t word = code[2], shape = (word >> 5) & 255u;
-    if (!is_fused_leaf(code[0], word)) return false;
-    const float* t = params + code[1];
-    const float* w = params + code[3];
-    Chunk& dst = r.value[(word >> 13) & 31u];
+// Both instructions of a leaf that is_fused_leaf(), where `code` begins with PointTranslate and is one: most edits begin like this.
+template <uint32_t kShape>
+static inline void moved_leaf(Registers& r, Chunk& dst, const float* t, const float* w) {
     for (int i = 0; i < KILN_VECTORS; ++i) {
         const real3 p = point_at(r.cell, i) - param3_at(t);
         set_point(r.point, i, p);
-        dst.v[i] = (shape == kFusedSphere ? shape_distance(kFusedSphere, p, w + 3, Samples{nullptr})
-                                          : shape_distance(kFusedBox, p, w + 3, Samples{nullptr})) *
-                   param(w[0]);
+        dst.v[i] = shape_distance(kShape, p, w + 3, Samples{nullptr}) * param(w[0]);
+    }
+}
+static inline bool moved_ball_or_box(Registers& r, const uint32_t* code, const float* params) {
+    const uint32_t word = code[2], shape = (word >> 5) & 255u;
+    if (!is_fused_leaf(code[0], word)) return false;
+    Chunk& dst = r.value[(word >> 13) & 31u];
+    if (shape == kFusedSphere) {
+        moved_leaf<kFusedSphere>(r, dst, params + code[1], params + code[3]);
+    } else {
+        moved_leaf<kFusedBox>(r, dst, params + code[1], params + code[3]);
     }
     return true;
 }
-#endif
 
 template <uint32_t kOp>
 static inline void combine_as(Chunk& dst, const Chunk& a, const Chunk& b, param k) {
@@ -192,12 +194,10 @@ static void run_distance(Registers& r, const uint32_t* code, size_t count, const
         const Chunk& a = r.value[(word >> 18) & 31u];
         const Chunk& b = r.value[(word >> 23) & 31u];
         const uint32_t aux = (word >> 5) & 255u;
-#ifdef KILN_FEW  // points too few to hide the cost of decoding: most edits begin like this
         if (Opcode(word & 31u) == Opcode::PointTranslate && pc + 1 < count && moved_ball_or_box(r, code + 2 * pc, params)) {
             ++pc;
             continue;
         }
-#endif
         switch (Opcode(word & 31u)) {
             case Opcode::Combine: combine(dst, a, b, aux & 3u, param(w[0])); break;
             case Opcode::Move:

@@ -77,9 +77,8 @@ struct BrickPoints {
     param z[kBrickSlices];
     bool plain;  // see is_plain()
 };
-struct BrickValues {
-    real v[kBrickSlices][kSliceVectors];
-};
+// Of a brick's 512 values.
+static inline float* vector_at(float* values, int slice, int i) { return values + (slice * kSliceVectors + i) * kBrickLanes; }
 
 #ifdef KILN_PRODUCTS
 // Numbers of which no leaf makes any whose square is lost: sums and differences of 0 and of what is from 2^-21 to 2^40 in size are multiples of 2^-44.
@@ -121,18 +120,24 @@ struct FusedLeaf {
     }
 };
 
-// How a leaf's value meets the running one.
+// How a leaf's value meets the running one. kProducts: see FusedLeaf::distance(). Where vectors are wide, the divider takes each in two turns
+// and an estimate is good after one step: more is left to products, quotients too.
+#if defined(KILN_PRODUCTS) && KILN_LANES == 16
+static constexpr bool kWide = true;
+#else
+static constexpr bool kWide = false;
+#endif
 struct JoinSet {
-    static constexpr int kProducts = 2;
+    static constexpr int kProducts = kWide ? 2 : 4;
     KILN_SDF real join(real, real d, param) { return d; }
 };
 struct JoinNegated {
-    static constexpr int kProducts = 2;
+    static constexpr int kProducts = kWide ? 2 : 4;
     KILN_SDF real join(real, real d, param) { return -d; }
 };
 template <uint32_t kOp>
 struct JoinHard {
-    static constexpr int kProducts = 2;
+    static constexpr int kProducts = kWide ? 2 : 4;
     KILN_SDF real join(real a, real d, param) { return hard_op<kOp>(a, d); }
 };
 template <uint32_t kOp>
@@ -140,28 +145,34 @@ struct JoinSmooth {
     static constexpr int kProducts = 4;
     KILN_SDF real join(real a, real d, param k) {
 #ifdef KILN_PRODUCTS
-        return products::op_distance(kOp, a.v, d.v, k).v;
-#else
-        return op_distance(kOp, a, d, k);
+        if (kWide) return products::op_distance(kOp, a.v, d.v, k).v;
 #endif
+        return op_distance(kOp, a, d, k);
     }
 };
 
 // kScaled: the shape's values are times something else than 1.
 template <uint32_t kShape, typename Join, bool kScaled>
-static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, BrickValues& values, const float* t, const float* w, float k) {
+static __attribute__((noinline)) void brick_leaf(const BrickPoints& points, float* values, const float* t, const float* w, float k) {
     const FusedLeaf leaf(kShape, points, t, w);
     for (int slice = 0; slice < kBrickSlices; ++slice) {
         const real from_z = real(points.z[slice] - leaf.z);
+        // Some distances, then as many joins: each waits for what is before it.
+        constexpr int kSome = 4;
 #pragma GCC unroll 16
-        for (int i = 0; i < kSliceVectors; ++i) {
-            const real d = leaf.distance<kShape, kShape == kFusedSphere ? Join::kProducts : 4>(i, from_z);
-            values.v[slice][i] = Join::join(values.v[slice][i], kScaled ? d * leaf.scale : d, param(k));
+        for (int first = 0; first < kSliceVectors; first += kSome) {
+            real d[kSome];
+            for (int i = 0; i < kSome; ++i)
+                d[i] = leaf.distance<kShape, kShape == kFusedSphere ? Join::kProducts : 4>(first + i, from_z);
+            for (int i = 0; i < kSome; ++i) {
+                float* const at = vector_at(values, slice, first + i);
+                store(at, Join::join(load(at), kScaled ? d[i] * leaf.scale : d[i], param(k)));
+            }
         }
     }
 }
 
-using BrickLeaf = void (*)(const BrickPoints&, BrickValues&, const float*, const float*, float);
+using BrickLeaf = void (*)(const BrickPoints&, float*, const float*, const float*, float);
 
 // By shape (those worth their machine code), then by join.
 template <uint32_t kShape, bool kScaled>
@@ -268,12 +279,11 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
                      const float* z, float* out, void* memory) {
     BrickPoints points;
     place_brick(points, x, y, z);
-    BrickValues values;
     size_t pc = 0;
     if (count > 0 && Opcode(code[0] & 31u) == Opcode::Empty && ((code[0] >> 13) & 31u) == 0u) {
         pc = 1;
         for (int slice = 0; slice < kBrickSlices; ++slice) {
-            for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = real(param(kEmpty));
+            for (int i = 0; i < kSliceVectors; ++i) store(vector_at(out, slice, i), real(param(kEmpty)));
         }
     }
     Registers r;
@@ -282,7 +292,7 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
         const float* t;
         float k;
         if (const BrickLeaf leaf = fused_leaf(points, code + 2 * pc, count - pc, params, t, k)) {
-            leaf(points, values, t, params + code[2 * pc + 3], k);
+            leaf(points, out, t, params + code[2 * pc + 3], k);
             pc += 3;
             continue;
         }
@@ -294,20 +304,17 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
         }
         for (int slice = 0; slice < kBrickSlices; ++slice) {
             place_slice(r, points, slice);
-            for (int i = 0; i < kSliceVectors; ++i) r.value[0].v[i] = values.v[slice][i];
+            for (int i = 0; i < kSliceVectors; ++i) r.value[0].v[i] = load(vector_at(out, slice, i));
             run_distance(r, code + 2 * pc, end - pc, params, Samples{samples});
-            for (int i = 0; i < kSliceVectors; ++i) values.v[slice][i] = r.value[0].v[i];
+            for (int i = 0; i < kSliceVectors; ++i) store(vector_at(out, slice, i), r.value[0].v[i]);
         }
         pc = end;
     }
     // Four at a time: a minimum waits for the one before it.
     real nearest[4];
-    for (int i = 0; i < 4; ++i) nearest[i] = abs(values.v[0][0]);
+    for (real& one : nearest) one = abs(load(out));
     for (int slice = 0; slice < kBrickSlices; ++slice) {
-        for (int i = 0; i < kSliceVectors; ++i) {
-            nearest[i & 3] = min(nearest[i & 3], abs(values.v[slice][i]));
-            store(out + (slice * kSliceVectors + i) * kBrickLanes, values.v[slice][i]);
-        }
+        for (int i = 0; i < kSliceVectors; ++i) nearest[i & 3] = min(nearest[i & 3], abs(load(vector_at(out, slice, i))));
     }
     float lanes[kBrickLanes];
     store(lanes, min(min(nearest[0], nearest[1]), min(nearest[2], nearest[3])));
@@ -382,10 +389,15 @@ void store_halves(const float* values, size_t count, float scale, float limit, f
 }
 #endif
 
-// Values of store_halves()'s bits, but for 0, which is 2^-15.
+// Values of store_halves()'s bits.
 static inline real half_values(const uint16_t* codes) {
-    const auto code = load_words(codes);
-    return real_of_bits(whole((((code & 0x7fffu) << 13) + 0x38000000u) | ((code & 0x8000u) << 16)));
+#ifdef KILN_HALVES
+    return real(load_half_words(codes));
+#else
+    const auto code = load_words(codes), size = code & 0x7fffu;
+    const real one = real_of_bits(whole(((size << 13) + 0x38000000u) | ((code & 0x8000u) << 16)));
+    return select(le(real_of(whole(size)), real(param(0))), real(param(0)), one);
+#endif
 }
 
 // Which of some texels are too near.

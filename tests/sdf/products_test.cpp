@@ -16,14 +16,14 @@
 namespace kiln::sdf {
 namespace {
 
-#define KILN_LANES 16
+// The texts of both widths. Which of so many answers differ from the processor's.
 #define KILN_PRODUCTS
+#define KILN_LANES 16
 #pragma GCC push_options
 #pragma GCC target("avx512f,avx512bw,avx512dq,avx512vl")
-namespace lanes {
+namespace sixteen {
 #include "sdf/lang/simd.h"
 
-// Sixteen numbers each; which answers differ from the processor's.
 uint32_t wrong_roots(const float* x) {
     const __m512 from = _mm512_loadu_ps(x), expected = _mm512_maskz_sqrt_ps(0xffff, from);
     return _mm512_cmpneq_epi32_mask(_mm512_castps_si512(expected), __m512i(sqrt(real(lane_f(from))).v));
@@ -32,25 +32,60 @@ uint32_t wrong_quotients(const float* n, float k) {
     const __m512 from = _mm512_loadu_ps(n), expected = _mm512_div_ps(from, _mm512_set1_ps(k));
     return _mm512_cmpneq_epi32_mask(_mm512_castps_si512(expected), __m512i(part_of(real(lane_f(from)), k).v));
 }
-}  // namespace lanes
+}  // namespace sixteen
 #pragma GCC pop_options
+#undef KILN_LANES
+#undef KILN_SDF
+#undef KILN_C
+#define KILN_LANES 8
+#pragma GCC push_options
+#pragma GCC target("avx2,fma,f16c")
+namespace eight {
+#include "sdf/lang/simd.h"
 
-TEST(Products, EveryRootHasTheProcessorsBits) {
-    if (!has_isa(Isa::Avx512)) GTEST_SKIP() << "no AVX-512";
-    // Two binades have all roots there are; what is four times as large has twice the root.
+uint32_t others(__m256 a, __m256 b) {
+    const __m256i same = _mm256_cmpeq_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b));
+    return 0xffu & ~uint32_t(_mm256_movemask_ps(_mm256_castsi256_ps(same)));
+}
+uint32_t wrong_roots(const float* x) {
+    const __m256 from = _mm256_loadu_ps(x);
+    return others(_mm256_sqrt_ps(from), __m256(sqrt(real(lane_f(from))).v));
+}
+// From inverses that are off by as much as any processor's estimate may be, or by part of it.
+uint32_t wrong_roots_from_afar(const float* x) {
+    const __m256 from = _mm256_loadu_ps(x);
+    const lane_f root = lane_f(_mm256_sqrt_ps(from));
+    uint32_t wrong = 0;
+    for (const float off : {-0x1.8p-12f, -0x1.1p-13f, 0.0f, 0x1.7p-14f, 0x1.8p-12f})
+        wrong |= others(__m256(root), __m256(sqrt_from(real(lane_f(from)), real((1 + off) / root)).v));
+    return wrong;
+}
+uint32_t wrong_quotients(const float* n, float k) {
+    const __m256 from = _mm256_loadu_ps(n);
+    return others(_mm256_div_ps(from, _mm256_set1_ps(k)), __m256(part_of(real(lane_f(from)), k).v));
+}
+}  // namespace eight
+#pragma GCC pop_options
+#undef KILN_LANES
+#undef KILN_PRODUCTS
+#undef KILN_SDF
+#undef KILN_C
+
+// fn(numbers, how many) of all mantissas of some exponents. Two binades have all roots there are; what is four times as large has twice the root.
+template <size_t kLanes, typename Fn>
+void each_number(Fn&& fn) {
     for (const uint32_t exponent : {127u - 90, 127u - 89, 126u, 127u, 127u + 98, 127u + 99}) {
-        for (uint32_t mantissa = 0; mantissa < 1u << 23; mantissa += 16) {
-            std::array<float, 16> x;
-            for (uint32_t i = 0; i < 16; ++i) x[i] = std::bit_cast<float>(exponent << 23 | (mantissa + i));
-            ASSERT_EQ(lanes::wrong_roots(x.data()), 0u) << "from " << x[0];
+        for (uint32_t mantissa = 0; mantissa < 1u << 23; mantissa += uint32_t(kLanes)) {
+            std::array<float, kLanes> x;
+            for (uint32_t i = 0; i < kLanes; ++i) x[i] = std::bit_cast<float>(exponent << 23 | (mantissa + i));
+            ASSERT_EQ(fn(x.data()), 0u) << "from " << x[0];
         }
     }
-    const std::array<float, 16> zeros{};
-    EXPECT_EQ(lanes::wrong_roots(zeros.data()), 0u);
 }
 
-TEST(Products, EveryPartOfABlendHasTheProcessorsBits) {
-    if (!has_isa(Isa::Avx512)) GTEST_SKIP() << "no AVX-512";
+// fn(parts, whole) of a blend, as many as lanes.
+template <size_t kLanes, typename Fn>
+void each_part(Fn&& fn) {
     Random random(7);
     for (int round = 0; round < 3000; ++round) {
         // Of all sizes; often with the mantissas that quotients are hardest with.
@@ -60,15 +95,36 @@ TEST(Products, EveryPartOfABlendHasTheProcessorsBits) {
         if (round % 7 == 0)
             k = std::bit_cast<float>((std::bit_cast<uint32_t>(k) & ~0x7fffffu) + uint32_t(random.below(3)));
         for (int at = 0; at < 200; ++at) {
-            std::array<float, 16> n;
+            std::array<float, kLanes> n;
             for (float& part : n) {
                 const float off =
                     at % 3 == 0 ? k * (1 - std::ldexp(random.in(0, 1), -random.below(24))) : k * random.in(0, 1);
                 part = std::fmax(k - off, 0.0f);
             }
-            ASSERT_EQ(lanes::wrong_quotients(n.data(), k), 0u) << "k " << k;
+            ASSERT_EQ(fn(n.data(), k), 0u) << "k " << k;
         }
     }
+}
+
+TEST(Products, EveryRootHasTheProcessorsBits) {
+    if (!has_isa(Isa::Avx2)) GTEST_SKIP() << "no AVX2";
+    const std::array<float, 16> zeros{};
+    each_number<8>(eight::wrong_roots);
+    EXPECT_EQ(eight::wrong_roots(zeros.data()), 0u);
+    if (!has_isa(Isa::Avx512)) return;
+    each_number<16>(sixteen::wrong_roots);
+    EXPECT_EQ(sixteen::wrong_roots(zeros.data()), 0u);
+}
+
+TEST(Products, RootsDoNotAskMuchOfTheEstimateTheyBeginWith) {
+    if (!has_isa(Isa::Avx2)) GTEST_SKIP() << "no AVX2";
+    each_number<8>(eight::wrong_roots_from_afar);
+}
+
+TEST(Products, EveryPartOfABlendHasTheProcessorsBits) {
+    if (!has_isa(Isa::Avx2)) GTEST_SKIP() << "no AVX2";
+    each_part<8>(eight::wrong_quotients);
+    if (has_isa(Isa::Avx512)) each_part<16>(sixteen::wrong_quotients);
 }
 
 TEST(Products, BricksOfAnySizeHaveTheScalarBits) {

@@ -61,22 +61,6 @@ KILN_SDF whole select(mask m, whole a, whole b) { return m.v ? a.v : b.v; }
 #if KILN_LANES == 16
 KILN_SDF real min(real a, real b) { return lane_f(_mm512_maskz_min_ps(0xffff, __m512(b.v), __m512(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm512_maskz_max_ps(0xffff, __m512(b.v), __m512(a.v))); }
-#ifdef KILN_PRODUCTS
-// Of 0, or of 2^-90 to 2^100: a square root to the last bit without the divider, which many processors have one of, and half as wide.
-// From an estimate to 14 bits root and half its inverse are bettered together; then the root's remainder, which is exact, corrects it
-// (Markstein, "Computation of elementary functions on the IBM RISC System/6000 processor", 1990). A test tries all numbers.
-KILN_SDF real sqrt(real a) {
-    const __m512 x = __m512(a.v), half = _mm512_set1_ps(0.5f);
-    const __m512 inverse = _mm512_maskz_rsqrt14_ps(0xffff, _mm512_maskz_max_ps(0xffff, x, _mm512_set1_ps(0x1p-90f)));
-    const __m512 root = _mm512_mul_ps(x, inverse), half_inverse = _mm512_mul_ps(half, inverse);
-    const __m512 off = _mm512_fnmadd_ps(root, half_inverse, half);
-    const __m512 better = _mm512_fmadd_ps(root, off, root),
-                 half_better = _mm512_fmadd_ps(half_inverse, off, half_inverse);
-    return lane_f(_mm512_fmadd_ps(_mm512_fnmadd_ps(better, better, x), half_better, better));
-}
-#else
-KILN_SDF real sqrt(real a) { return lane_f(_mm512_maskz_sqrt_ps(0xffff, __m512(a.v))); }
-#endif
 KILN_SDF real floor(real a) {
     return lane_f(_mm512_maskz_roundscale_ps(0xffff, __m512(a.v), _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC));
 }
@@ -85,14 +69,12 @@ KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm512_movepi32_mask(__m51
 #elif KILN_LANES == 8
 KILN_SDF real min(real a, real b) { return lane_f(_mm256_min_ps(__m256(b.v), __m256(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm256_max_ps(__m256(b.v), __m256(a.v))); }
-KILN_SDF real sqrt(real a) { return lane_f(_mm256_sqrt_ps(__m256(a.v))); }
 KILN_SDF real floor(real a) { return lane_f(_mm256_floor_ps(__m256(a.v))); }
 KILN_SDF whole whole_of(real a) { return lane_u(_mm256_cvttps_epi32(__m256(a.v))); }
 KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm256_movemask_ps(__m256(m.v))); }
 #else
 KILN_SDF real min(real a, real b) { return lane_f(_mm_min_ps(__m128(b.v), __m128(a.v))); }
 KILN_SDF real max(real a, real b) { return lane_f(_mm_max_ps(__m128(b.v), __m128(a.v))); }
-KILN_SDF real sqrt(real a) { return lane_f(_mm_sqrt_ps(__m128(a.v))); }
 KILN_SDF real floor(real a) { return lane_f(_mm_floor_ps(__m128(a.v))); }
 KILN_SDF whole whole_of(real a) { return lane_u(_mm_cvttps_epi32(__m128(a.v))); }
 KILN_SDF uint32_t lane_bits(mask m) { return uint32_t(_mm_movemask_ps(__m128(m.v))); }
@@ -101,15 +83,51 @@ KILN_SDF bool all_of(mask m) { return lane_bits(m) == (1u << KILN_LANES) - 1; }
 KILN_SDF real abs(real a) { return lane_f(lane_i(a.v) & 0x7fffffff); }
 KILN_SDF real clamp(real x, real lo, real hi) { return min(max(x, lo), hi); }
 #ifdef KILN_PRODUCTS
+// Rounded once: a b + c, and c - a b. And of a >= 2^-90: 1 / sqrt(a), to so many bits that root and inverse are bettered kRootSteps times.
+#if KILN_LANES == 16
+KILN_SDF real fused(real a, real b, real c) { return lane_f(_mm512_fmadd_ps(__m512(a.v), __m512(b.v), __m512(c.v))); }
+KILN_SDF real fused_from(real c, real a, real b) {
+    return lane_f(_mm512_fnmadd_ps(__m512(a.v), __m512(b.v), __m512(c.v)));
+}
+KILN_SDF real rough_inverse_root(real a) { return lane_f(_mm512_maskz_rsqrt14_ps(0xffff, __m512(a.v))); }
+constexpr int kRootSteps = 1;  // from 14 bits
+#else
+KILN_SDF real fused(real a, real b, real c) { return lane_f(_mm256_fmadd_ps(__m256(a.v), __m256(b.v), __m256(c.v))); }
+KILN_SDF real fused_from(real c, real a, real b) {
+    return lane_f(_mm256_fnmadd_ps(__m256(a.v), __m256(b.v), __m256(c.v)));
+}
+KILN_SDF real rough_inverse_root(real a) { return lane_f(_mm256_rsqrt_ps(__m256(a.v))); }
+constexpr int kRootSteps = 2;  // from 11
+#endif
+// Of 0, or of 2^-90 to 2^100: a square root to the last bit without the divider, which many processors have one of, and half as wide.
+// From an estimate of its inverse, root and half its inverse are bettered together; then the root's remainder, which is exact, corrects it
+// (Markstein, "Computation of elementary functions on the IBM RISC System/6000 processor", 1990). A test tries all numbers.
+KILN_SDF real sqrt_from(real x, real inverse) {
+    const real half(0.5f);
+    real root = x * inverse, half_inverse = half * inverse;
+    for (int step = 0; step < kRootSteps; ++step) {
+        const real off = fused_from(half, root, half_inverse);
+        root = fused(root, off, root);
+        half_inverse = fused(half_inverse, off, half_inverse);
+    }
+    return fused(fused_from(x, root, root), half_inverse, root);
+}
+KILN_SDF real sqrt(real a) { return sqrt_from(a, rough_inverse_root(max(a, real(0x1p-90f)))); }
 // Likewise, of 2^-60 < k < 2^60: k's inverse as two numbers makes a quotient to a bit, which its exact remainder corrects.
 KILN_SDF real part_of(real n, param k) {
-    const __m512 part = __m512(n.v), divisor = _mm512_set1_ps(k), one = _mm512_set1_ps(1.0f),
-                 inverse = _mm512_set1_ps(1.0f / k);
-    const __m512 rest = _mm512_mul_ps(_mm512_fnmadd_ps(inverse, divisor, one), inverse);
-    const __m512 quotient = _mm512_fmadd_ps(part, inverse, _mm512_mul_ps(part, rest));
-    return lane_f(_mm512_fmadd_ps(_mm512_fnmadd_ps(quotient, divisor, part), inverse, quotient));
+    const real divisor(k), inverse(1.0f / k);
+    const real rest = fused_from(real(1.0f), inverse, divisor) * inverse;
+    const real quotient = fused(n, inverse, n * rest);
+    return fused(fused_from(n, quotient, divisor), inverse, quotient);
 }
 #else
+#if KILN_LANES == 16
+KILN_SDF real sqrt(real a) { return lane_f(_mm512_maskz_sqrt_ps(0xffff, __m512(a.v))); }
+#elif KILN_LANES == 8
+KILN_SDF real sqrt(real a) { return lane_f(_mm256_sqrt_ps(__m256(a.v))); }
+#else
+KILN_SDF real sqrt(real a) { return lane_f(_mm_sqrt_ps(__m128(a.v))); }
+#endif
 KILN_SDF real part_of(real n, param k) { return n.v / k; }
 #endif
 KILN_SDF whole bits_of(real a) { return lane_u(a.v); }
