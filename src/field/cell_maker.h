@@ -7,11 +7,13 @@
 #pragma once
 
 #include "field/brick_content.h"
+#include "field/cell_rows.h"
 #include "field/jumps.h"
 #include "sdf/cull.h"
 #include "sdf/rebase.h"
 
 #include <algorithm>
+#include <bit>
 #include <memory>
 #include <span>
 #include <vector>
@@ -65,6 +67,7 @@ bool stays(std::span<const sdf::Instruction> code, const sdf::Program& program, 
 ///     void empty(ivec3 cell, bool inside)
 ///     bool keeps(ivec3 cell, Inserted, ListCuller::Start)    it is as it was
 /// and, of run_box() alone,
+///     uint32_t wanted(ivec3 first, int count)     of a row of cells within a page, a bit each: those that it wants
 ///     StillCells look(const CellMaker&, uint64_t changing)    of the cells centres() are of, a bit each: those that an edit may change
 ///     bool is_empty(ivec3 cell)                   as it was
 ///     bool texels_stay(ivec3 cell, CellMaker&)    it has a brick, with another code but the same texels, and has taken it
@@ -243,12 +246,13 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
     };
     for (int z = box.min.z; z < box.max.z; ++z) {
         for (int y = box.min.y; y < box.max.y; ++y) {
-            for (int x = box.min.x; x < box.max.x; ++x) {
-                const ivec3 cell{x, y, z};
-                if (!sink.wants(cell)) continue;
-                cell_[n] = cell;
-                place_ball(cells_.balls, n, cell, 1);
-                if (++n == 64) run();
+            for (int x = box.min.x, end; x < box.max.x; x = end) {
+                end = std::min(first_of_row(x) + kCellPage, box.max.x);
+                for (uint32_t left = sink.wanted({x, y, z}, end - x); left != 0; left &= left - 1) {
+                    cell_[n] = {x + std::countr_zero(left), y, z};
+                    place_ball(cells_.balls, n, cell_[n], 1);
+                    if (++n == 64) run();
+                }
             }
         }
     }

@@ -117,4 +117,30 @@ inline uint32_t bits_of(const uint32_t* words, int bit) {
     return out;
 }
 
+/// Of 8 words, bit k of each is word k's: whether it is occupied; its jump's three bits, none where it is occupied.
+struct RowBits {
+    uint32_t occupied, jump[3];
+};
+inline RowBits row_bits(const uint32_t* words) {
+#if defined(__SSE2__)
+    using Four __attribute__((vector_size(16))) = int32_t;
+    using Bytes __attribute__((vector_size(16))) = char;
+    // A byte a word: its jump, and bit 3 where it is occupied.
+    const auto half = [](const uint32_t* from) {
+        Four four;
+        std::memcpy(&four, from, sizeof four);
+        return (four & 7) | (four >> 31 & 8);
+    };
+    using Eights __attribute__((vector_size(16))) = int16_t;
+    const Eights eight = __builtin_ia32_packssdw128(half(words), half(words + 4));
+    const Eights bytes = Eights(__builtin_ia32_packsswb128(eight, Eights{}));
+    const auto bit = [&](int i) { return uint32_t(__builtin_ia32_pmovmskb128(Bytes(bytes << (7 - i)))); };
+    const uint32_t occupied = bit(3);
+    return {occupied, {bit(0) & ~occupied, bit(1) & ~occupied, bit(2) & ~occupied}};
+#else
+    const uint32_t occupied = bits_of(words, 31);
+    return {occupied, {bits_of(words, 0) & ~occupied, bits_of(words, 1) & ~occupied, bits_of(words, 2) & ~occupied}};
+#endif
+}
+
 }  // namespace kiln::field

@@ -121,17 +121,31 @@ private:
         bool wants(const CellBox& box) const {
             return whole() || std::any_of(dirty.begin(), dirty.end(), [&](const CellBox& b) { return meet(box, b); });
         }
-        bool wants(ivec3 cell) const {
-            if (whole()) return true;
-            const auto has_cell = [&](const CellBox& b) { return contains(b, cell); };
-            if (std::any_of(earlier.begin(), earlier.end(), has_cell)) return false;
-            if (std::none_of(dirty.begin(), dirty.end(), has_cell)) return false;
-            const uint32_t word = builder.old_->cells_.at(cell.x, cell.y, cell.z);
-            if ((word & kCellOccupied) != 0) {
-                builder.ask_for(word & kCellSlotMask);
-                return true;
+        bool wants(ivec3 cell) const { return whole() || wanted(cell, 1) != 0; }
+        uint32_t wanted(ivec3 first, int count) const {
+            const auto within = [&](std::span<const CellBox> boxes) {
+                uint32_t out = 0;
+                for (const CellBox& b : boxes) {
+                    if (first.y < b.min.y || first.y >= b.max.y || first.z < b.min.z || first.z >= b.max.z) continue;
+                    const int from = std::max(b.min.x - first.x, 0), to = std::min(b.max.x - first.x, count);
+                    if (from < to) out |= ((1u << (to - from)) - 1) << from;
+                }
+                return out;
+            };
+            const uint32_t changed = within(dirty) & ~within(earlier);
+            if (changed == 0) return 0;
+            const CellMap& cells = builder.old_->cells_;
+            const CellMap::Words::Page* const page =
+                cells.words().find(cells.page_index(first.x / kCellPage, first.y / kCellPage, first.z / kCellPage));
+            uint32_t bricks = 0;
+            if (page != nullptr) {
+                const uint32_t* const words = page->data() + row_of(first.y, first.z);
+                const int at = first.x - first_of_row(first.x);
+                bricks = bits_of(words, 31) >> at & changed;
+                for (uint32_t left = bricks; left != 0; left &= left - 1)
+                    builder.ask_for(words[at + std::countr_zero(left)] & kCellSlotMask);
             }
-            return std::any_of(builder.owned_.begin(), builder.owned_.end(), has_cell);
+            return bricks | (changed & within(builder.owned_));
         }
         static bool stop() { return false; }
         void air(const CellBox& box) {

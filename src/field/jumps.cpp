@@ -177,7 +177,8 @@ public:
           reach_(reach),
           words_(words) {
         const size_t rows = size_t(size_.y + 2) * size_t(size_.z + 2);
-        words_.assign(kPlanes * rows, 0);
+        words_.resize(std::max(words_.size(), kPlanes * rows));
+        std::fill_n(words_.begin(), kMade * rows, uint64_t(0));
         for (size_t i = 0; i < kPlanes; ++i) plane_[i] = words_.data() + i * rows;
         load();
     }
@@ -196,7 +197,7 @@ public:
         if (!follow([&](size_t row, uint32_t k) { return equal(row, k); }, [](size_t, uint32_t, uint64_t) {}))
             return false;
         // What the wave met is told by what is around it: one more than the least jump beside it.
-        std::copy_n(plane_[kOccupied], words_.size() / kPlanes, plane_[kFront]);
+        std::copy_n(plane_[kOccupied], plane_[kJump] - plane_[kOccupied], plane_[kFront]);
         for (uint32_t k = 1; k <= uint32_t(kMaxJump); ++k) {
             const Rows rows = rows_of(reached_);
             if (k < uint32_t(kMaxJump)) dilate(rows);
@@ -225,7 +226,8 @@ private:
         kGiven = kNew + 3,
         kSeen,
         kFront,
-        kNear,
+        kMade,  // from here on, planes are written before they are read
+        kNear = kMade,
         kAlong,
         kAcross,
         kPlanes
@@ -260,11 +262,9 @@ private:
                         for (size_t i = kJump; i < kJump + 3; ++i) plane_[i][row] |= ours;
                         continue;
                     }
-                    const uint32_t* const from = words->data() + row_of(y, z);
-                    const uint32_t occupied = bits_of(from, 31);
-                    plane_[kOccupied][row] |= uint64_t(occupied) << x8 & ours;
-                    for (int i = 0; i < 3; ++i)
-                        plane_[size_t(kJump + i)][row] |= uint64_t(bits_of(from, i) & ~occupied) << x8 & ours;
+                    const RowBits bits = row_bits(words->data() + row_of(y, z));
+                    plane_[kOccupied][row] |= uint64_t(bits.occupied) << x8 & ours;
+                    for (size_t i = 0; i < 3; ++i) plane_[kJump + i][row] |= uint64_t(bits.jump[i]) << x8 & ours;
                 }
             }
         });
@@ -385,7 +385,7 @@ void lower_jumps(CellMap& cells, std::span<const ivec3> occupied) {
 }
 
 void raise_jumps(CellMap& cells, std::span<const ivec3> emptied) {
-    change(cells, emptied, kFewCells + 1, [&](Window& window) { return window.raise(emptied); });
+    change(cells, emptied, kFewCells + 3, [&](Window& window) { return window.raise(emptied); });
 }
 
 }  // namespace kiln::field
