@@ -8,8 +8,11 @@
 namespace kiln::field {
 namespace {
 
-// Where points without a brick read: what they find is not looked at.
-alignas(64) constexpr std::byte kNoTexels[2 * kBrickTexelCount] = {};
+// Where points without a brick read: what they find is not looked at. As in a brick, something is before the codes.
+struct NoTexels {
+    alignas(64) std::byte before[64], codes[2 * kBrickTexelCount];
+};
+constexpr NoTexels kNoTexels{};
 
 auto distance_by(sdf::Isa isa) {
     return isa == sdf::Isa::Avx512 ? &wide_avx512::distance
@@ -25,7 +28,7 @@ WideEntry address_of(const std::byte* codes) { return WideEntry(reinterpret_cast
 WideEntry wide_entry_of_brick(const std::byte* codes) { return kWideOccupied | address_of(codes); }
 WideEntry wide_entry_of_empty(uint32_t word) {
     return ((word & kCellInside) != 0 ? kWideInside : 0) | WideEntry(word & 7u) << kWideJumpShift |
-           address_of(kNoTexels);
+           address_of(kNoTexels.codes);
 }
 
 WideView::WideView(const GridParams& g, const WidePage* const* first_page, int along_x, int along_y,

@@ -59,6 +59,25 @@ static inline I gather_from(const Pointers& p) {
     return (I)_mm256_set_m128i(_mm256_i64gather_epi32(base, p.high, 1), _mm256_i64gather_epi32(base, p.low, 1));
 }
 
+// Halves of texels (0, 0) and (1, 0), (0, 1) and (1, 1) of this slice and the next, a word a pair, from where each lane's first one lies. Both pairs
+// of a slice are in the 32 bytes that end with them, which never leave their brick: 12 bytes before its codes are its own too (brick_content.h).
+// Gathers of so many lanes take processors far longer than loads of rows.
+#define KILN_PAIRS_BY_ROWS
+static inline void pairs_by_rows(const std::byte* const (&texel)[kLanes], I (&codes)[4]) {
+    for (int z = 0; z < 2; ++z) {
+        __m256i rows[kLanes];  // words 3 and 7 of each
+        for (int lane = 0; lane < kLanes; ++lane)
+            rows[lane] = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(texel[lane] + z * 128 - 12));
+        const auto four = [&](int lane) {
+            return _mm256_unpackhi_epi64(_mm256_unpackhi_epi32(rows[lane], rows[lane + 1]),
+                                         _mm256_unpackhi_epi32(rows[lane + 2], rows[lane + 3]));
+        };
+        const __m256i low = four(0), high = four(4);
+        codes[2 * z] = (I)_mm256_permute2x128_si256(low, high, 0x20);
+        codes[2 * z + 1] = (I)_mm256_permute2x128_si256(low, high, 0x31);
+    }
+}
+
 static inline I floor_to_int(F a) { return to_int(floor(a)); }
 
 #include "field/wide_math.inl"

@@ -139,6 +139,17 @@ struct GridTexels {
     }
 };
 
+#ifdef KILN_PAIRS_BY_ROWS
+// Where halves of each lane's texel lie, `origin` being texel 0's.
+struct TexelsOf {
+    int32_t texel[kLanes];
+    explicit TexelsOf(I of) { std::memcpy(texel, &of, sizeof texel); }
+    const std::byte* of(uintptr_t origin, int lane) const {
+        return reinterpret_cast<const std::byte*>(origin + uintptr_t(intptr_t(texel[lane]) * 2));
+    }
+};
+#endif
+
 // A packet whose neighbours lie in few cells, as points do that are asked in the order of space: a cell is looked up once for all its
 // lanes, and their texels are read from one base.
 template <bool Half>
@@ -194,15 +205,31 @@ struct Neighbours {
     bool answer(const WideView& view, const GridTexels& grid, const Split& p, Cell cell, F& out) const {
         I codes[4]{}, flags{};
         M left = all();
+#ifdef KILN_PAIRS_BY_ROWS
+        const TexelsOf from(texel);
+        const std::byte* at[kLanes];
+#endif
         for (;;) {
             const M here = both(left, cell.here);
             left = without(left, here);
             if ((bits(here) & (bits(here) - 1)) == 0 && any(left)) return false;
-            for (int i = 0; i < 4; ++i) codes[i] = gather_bytes<kBytes>(here, pairs(cell.origin, i), texel, codes[i]);
+#ifdef KILN_PAIRS_BY_ROWS
+            if constexpr (Half) {
+                for (uint32_t lanes_here = bits(here); lanes_here != 0; lanes_here &= lanes_here - 1) {
+                    const int lane = __builtin_ctz(lanes_here);
+                    at[lane] = from.of(cell.origin, lane);
+                }
+            } else
+#endif
+                for (int i = 0; i < 4; ++i)
+                    codes[i] = gather_bytes<kBytes>(here, pairs(cell.origin, i), texel, codes[i]);
             flags = select(here, splat(cell.flags), flags);
             if (!any(left)) break;
             if (!find(view, grid, __builtin_ctz(bits(left)), cell)) return false;
         }
+#ifdef KILN_PAIRS_BY_ROWS
+        if constexpr (Half) pairs_by_rows(at, codes);
+#endif
         out = blend(codes, p.part);
         const M occupied = is_occupied(flags);
         if (any(without(all(), occupied))) out = select(occupied, out, Located(view, p).empty(flags));
@@ -221,6 +248,15 @@ template <bool Half>
 static inline F answer(const Near& p) {
     using Codes = Neighbours<Half>;
     I codes[4];
+#ifdef KILN_PAIRS_BY_ROWS
+    if constexpr (Half) {
+        const TexelsOf from(p.texel);
+        const std::byte* at[kLanes];
+        for (int lane = 0; lane < kLanes; ++lane) at[lane] = from.of(p.origin, lane);
+        pairs_by_rows(at, codes);
+        return Codes::blend(codes, p.part);
+    }
+#endif
     for (int i = 0; i < 4; ++i) codes[i] = gather_bytes<Codes::kBytes>(Codes::pairs(p.origin, i), p.texel);
     return Codes::blend(codes, p.part);
 }
