@@ -158,7 +158,7 @@ namespace {
 // Jumps differ by at most one between neighbours. So a cell whose jump becomes k because of a new brick lies beside one whose jump becomes
 // k - 1, and so on down to that brick; and where a jump was k because of a brick that is gone, the same holds of what was. Either way the
 // wave of cells that change starts there, and is followed no further than it reaches, which in a crowd is a cell or two: a window
-// that shows so far is tried first, and one more cell where jumps rise, which is told by what lies around.
+// that shows so far is tried first, and three more cells where jumps rise, which reach further and are told by what lies around.
 constexpr int kFewCells = 2, kAllCells = kJumpReach + 1;
 
 // The jumps around some cells, a bit a cell and a word a row. Beyond the window's sides lie rows of nothing.
