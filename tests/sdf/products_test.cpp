@@ -71,7 +71,7 @@ uint32_t wrong_quotients(const float* n, float k) {
 #undef KILN_SDF
 #undef KILN_C
 
-// fn(numbers, how many) of all mantissas of some exponents. Two binades have all roots there are; what is four times as large has twice the root.
+// fn(numbers), as many as lanes, of all mantissas of some exponents. Two binades have all roots there are; what is four times as large has twice the root.
 template <size_t kLanes, typename Fn>
 void each_number(Fn&& fn) {
     for (const uint32_t exponent : {127u - 90, 127u - 89, 126u, 127u, 127u + 98, 127u + 99}) {
