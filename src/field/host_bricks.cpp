@@ -244,9 +244,11 @@ void HostBricks::march_refined(std::span<const Ray> rays, MarchHit* hits, sdf::I
 void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, bool refine, sdf::Isa isa) const {
     constexpr size_t kBlock = RayRefiner::kMostRays;
     const WideView& view = wide_view();
-    const double h = double(view.grid.voxel_size);
-    int32_t whole[3][kBlock];
-    float part[3][kBlock], direction[3][kBlock], far[kBlock];
+    const GridParams& grid = view.grid;
+    const double h = double(grid.voxel_size);
+    TexelRay from{};  // but its direction: the last ray's, as `far`
+    float far = 0;
+    WideRay wide[kBlock];
     RayNote notes[kBlock];
     std::optional<RayRefiner> refiner;
     if (refine) refiner.emplace(*field_, isa);
@@ -254,30 +256,23 @@ void HostBricks::march(std::span<const Ray> rays, MarchHit* hits, bool refine, s
         const size_t count = std::min(kBlock, rays.size() - first);
         for (size_t i = 0; i < count; ++i) {
             const Ray& ray = rays[first + i];
-            if (i > 0 && ray.origin == rays[first + i - 1].origin) {
-                for (int axis = 0; axis < 3; ++axis) {
-                    whole[axis][i] = whole[axis][i - 1];
-                    part[axis][i] = part[axis][i - 1];
-                }
-            } else {
-                const TexelRay texels = texel_ray_of({double(ray.origin.x), double(ray.origin.y), double(ray.origin.z)},
-                                                     ray.direction, view.grid.voxel_size);
-                whole[0][i] = texels.whole.x, whole[1][i] = texels.whole.y, whole[2][i] = texels.whole.z;
-                part[0][i] = texels.part.x, part[1][i] = texels.part.y, part[2][i] = texels.part.z;
-            }
-            direction[0][i] = ray.direction.x, direction[1][i] = ray.direction.y, direction[2][i] = ray.direction.z;
-            far[i] = i > 0 && ray.t_max == rays[first + i - 1].t_max
-                         ? far[i - 1]
-                         : float(std::min(double(ray.t_max) / h, double(kFarVoxels)));
+            WideRay& to = wide[i];
+            if (i == 0 || ray.origin != rays[first + i - 1].origin)
+                from = texel_ray_of({double(ray.origin.x), double(ray.origin.y), double(ray.origin.z)}, ray.direction,
+                                    grid.voxel_size);
+            to.part[0] = from.part.x, to.part[1] = from.part.y, to.part[2] = from.part.z;
+            to.whole[0] = from.whole.x - grid.cell_x * kBrickVoxels;
+            to.whole[1] = from.whole.y - grid.cell_y * kBrickVoxels;
+            to.whole[2] = from.whole.z - grid.cell_z * kBrickVoxels;
+            to.direction[0] = ray.direction.x, to.direction[1] = ray.direction.y, to.direction[2] = ray.direction.z;
+            if (i == 0 || ray.t_max != rays[first + i - 1].t_max)
+                far = float(std::min(double(ray.t_max) / h, double(kFarVoxels)));
+            to.t_max = far;
         }
-        const WideRays wide{{whole[0], whole[1], whole[2]},
-                            {part[0], part[1], part[2]},
-                            {direction[0], direction[1], direction[2]},
-                            far};
         const std::span found(hits + first, count);
         wide_march(view, wide, int(count), found.data(), refine ? notes : nullptr, isa);
         if (refine) {
-            refiner->run(wide, found, std::span(notes).first(count));
+            refiner->run(std::span(wide).first(count), found, std::span(notes).first(count));
             continue;
         }
         const MarchHit* before = nullptr;  // neighbours in the list often are so in space

@@ -16,8 +16,8 @@ constexpr int kFew = 16;  // points that cost less than kLooks
 
 }  // namespace
 
-void RayRefiner::run(const WideRays& rays, std::span<MarchHit> hits, std::span<const RayNote> notes) {
-    rays_ = &rays, hits_ = hits, notes_ = notes;
+void RayRefiner::run(std::span<const WideRay> rays, std::span<MarchHit> hits, std::span<const RayNote> notes) {
+    rays_ = rays, hits_ = hits, notes_ = notes;
     brick_count_ = 0;
     remembered_.fill(-1);
     for (int i = 0; i < int(hits.size()); ++i) {
@@ -71,11 +71,12 @@ int RayRefiner::brick_at(ivec3 cell) {
 
 // Where a ray is, voxels from the brick's first texel.
 std::array<float, 3> RayRefiner::in_brick(const Brick& brick, int ray, float t) const {
+    const GridParams& g = field_.grid();
+    const WideRay& r = rays_[size_t(ray)];
     const auto axis = [&](size_t a, int cell) {
-        return float(double(rays_->whole[a][ray] - cell * kBrickVoxels) + double(rays_->part[a][ray]) +
-                     double(rays_->direction[a][ray]) * double(t));
+        return float(double(r.whole[a] - cell * kBrickVoxels) + double(r.part[a]) + double(r.direction[a]) * double(t));
     };
-    return {axis(0, brick.cell.x), axis(1, brick.cell.y), axis(2, brick.cell.z)};
+    return {axis(0, brick.cell.x - g.cell_x), axis(1, brick.cell.y - g.cell_y), axis(2, brick.cell.z - g.cell_z)};
 }
 
 // Sixteen points or all: those that nobody asks about are of before, and as cheap.
@@ -106,14 +107,16 @@ void RayRefiner::search(const Brick& brick) {
             const NearPass& pass = notes_[size_t(ray)].passes[next % 2];
             const float from = std::max(pass.from - kSearchMore, 0.0f);
             open[size_t(count++)] = {
-                ray, next, from, std::min(pass.to + kSearchMore, rays_->t_max[ray]), in_brick(brick, ray, from), from};
+                ray, next, from, std::min(pass.to + kSearchMore, rays_[size_t(ray)].t_max), in_brick(brick, ray, from),
+                from};
         }
         for (int round = 0; round < kSearchRounds && count > 0; ++round) {
             for (int i = 0; i < count; ++i) {
                 const Stretch& s = open[size_t(i)];
                 const float gap = (s.to - s.from) / float(kSearchLooks - 1);
                 const auto axis = [&](size_t a, std::array<float, kLooks>& out) {
-                    const float along = rays_->direction[a][s.ray], begin = s.begin[a], first = s.from - s.t_begin;
+                    const float along = rays_[size_t(s.ray)].direction[a], begin = s.begin[a],
+                                first = s.from - s.t_begin;
                     for (int k = 0; k < kSearchLooks; ++k)
                         out[size_t(i * kSearchLooks + k)] = (base[a] + (begin + along * (first + gap * float(k)))) * h;
                 };
@@ -142,7 +145,8 @@ void RayRefiner::search(const Brick& brick) {
                     hit.slot = int(brick.slot);
                     hit.cell = brick.cell;
                     std::array<float, 3> there;
-                    for (size_t a = 0; a < 3; ++a) there[a] = s.begin[a] + rays_->direction[a][s.ray] * (t - s.t_begin);
+                    for (size_t a = 0; a < 3; ++a)
+                        there[a] = s.begin[a] + rays_[size_t(s.ray)].direction[a] * (t - s.t_begin);
                     for (size_t a = 0; a < 3; ++a) {
                         const float voxel = std::clamp(std::floor(there[a]), 0.0f, float(kBrickVoxels - 1));
                         (a == 0 ? hit.voxel.x : a == 1 ? hit.voxel.y : hit.voxel.z) = int(voxel);
@@ -167,7 +171,7 @@ void RayRefiner::polish(const Brick& brick) {
         const int i = count++;
         polished_[size_t(i)] = ray;
         lanes.first[0][i] = x, lanes.first[1][i] = y, lanes.first[2][i] = z;
-        for (int axis = 0; axis < 3; ++axis) lanes.along[axis][i] = rays_->direction[axis][ray];
+        for (int axis = 0; axis < 3; ++axis) lanes.along[axis][i] = rays_[size_t(ray)].direction[axis];
         lanes.slope[i] = slope;
         if (count == RayPolish::kMost) polish_all(brick, std::exchange(count, 0));
     };
@@ -208,7 +212,7 @@ void RayRefiner::polish_all(const Brick& brick, int count) {
         if (lanes.state[i] != RayPolish::kDone) continue;
         const int ray = polished_[size_t(i)];
         MarchHit& hit = hits_[size_t(ray)];
-        hit.t = std::clamp(hit.t + lanes.t[i], 0.0f, rays_->t_max[ray]);
+        hit.t = std::clamp(hit.t + lanes.t[i], 0.0f, rays_[size_t(ray)].t_max);
         hit.voxel = {lanes.voxel[0][i], lanes.voxel[1][i], lanes.voxel[2][i]};
         hit.p = {lanes.p[0][i], lanes.p[1][i], lanes.p[2][i]};
     }

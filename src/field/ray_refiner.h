@@ -21,7 +21,7 @@ public:
     RayRefiner(const Field& field, sdf::Isa isa) : field_(field), isa_(isa) {}
 
     /// `hits` and `notes` are what wide_march() found of `rays`, kMostRays at most. Slots of hits are filled in.
-    void run(const WideRays& rays, std::span<MarchHit> hits, std::span<const RayNote> notes);
+    void run(std::span<const WideRay> rays, std::span<MarchHit> hits, std::span<const RayNote> notes);
 
 private:
     // A brick that rays look at, and those rays: first the one that came last; -1: none. Number k of a ray's passes is 2 * ray + k.
@@ -43,7 +43,7 @@ private:
     sdf::Isa isa_;
 
     // Of the block at hand:
-    const WideRays* rays_ = nullptr;
+    std::span<const WideRay> rays_;
     std::span<MarchHit> hits_;
     std::span<const RayNote> notes_;
     static constexpr int kMostBricks = 3 * kMostRays;

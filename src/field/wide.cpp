@@ -91,12 +91,8 @@ int wide_polish_steps(RayPolish& rays, int count, const float* metres, sdf::Isa 
 
 void wide_polish_places(RayPolish& rays, int count, sdf::Isa isa) { KILN_CHOOSE_WIDE(isa, polish_places)(rays, count); }
 
-void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa) {
-    const auto run = isa == sdf::Isa::Avx512 ? &wide_avx512_rays::march
-                     : isa == sdf::Isa::Avx2 ? &wide_avx2::march
-                     : isa == sdf::Isa::Sse4 ? &wide_sse4::march
-                                             : &wide_scalar::march;
-    run(view, rays, count, hits, notes);
+void wide_march(const WideView& view, WideRay* rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa) {
+    KILN_CHOOSE_WIDE(isa, march)(view, rays, count, hits, notes);
 }
 
 }  // namespace kiln::field

@@ -49,12 +49,16 @@ struct WideView {
 /// WideView::places of one axis; 0, 1, 2: x, y, z.
 std::vector<uint64_t> wide_places(int axis, ivec3 size);
 
-/// Rays in texels, as arrays: TexelRay's fields without `inverse`, and how far each goes (voxels).
-struct WideRays {
-    const int32_t* whole[3];
-    const float* part[3];
-    const float* direction[3];
-    const float* t_max;
+/// A ray in texels, counted from the grid's first, and how far it goes (voxels): four rows of four numbers.
+struct alignas(64) WideRay {
+    float inverse[3];  ///< the march's own, as `octant`
+    float t_max;
+    float direction[3];
+    int32_t octant;
+    float part[3];
+    int32_t unused_after_part;
+    int32_t whole[3];
+    int32_t unused_after_whole;
 };
 
 /// A voxel with a solid corner that a ray left again.
@@ -100,6 +104,6 @@ void wide_distances(const WideView& view, const sdf::Points& points, float* out,
 float wide_distance(const WideView& view, const vec3& p, sdf::Isa isa);
 /// hits[i] = field_march(ray i, 0, t_max), but for `slot` (whether there is one: the caller knows it from the cell) and the counters
 /// `cells` and `voxels`, which stay 0. notes[i]: ray i's, where asked for.
-void wide_march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa);
+void wide_march(const WideView& view, WideRay* rays, int count, MarchHit* hits, RayNote* notes, sdf::Isa isa);
 
 }  // namespace kiln::field

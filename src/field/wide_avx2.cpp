@@ -30,7 +30,24 @@ static inline I gather_bytes(M m, const void* base, I index, I others) {
                                           kScale);
 }
 static inline uint32_t bits(M m) { return uint32_t(_mm256_movemask_ps((__m256)m)); }
+static inline I widened(const uint8_t (&of)[kLanes]) {
+    return (I)_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(of)));
+}
 static inline int count(M m) { return __builtin_popcount(bits(m)); }
+
+// Rows of four floats: those of lanes k and k + 4. In each half: the first two of a and b in turns, the last two; the first two of a, then
+// of b, the last two.
+static inline F rows_from(const float* const (&at)[kLanes], int k, int first) {
+    return (F)_mm256_set_m128(_mm_load_ps(at[k + 4] + first), _mm_load_ps(at[k] + first));
+}
+static inline void rows_to(float* const (&at)[kLanes], int k, int first, F rows) {
+    _mm_store_ps(at[k] + first, _mm256_castps256_ps128((__m256)rows));
+    _mm_store_ps(at[k + 4] + first, _mm256_extractf128_ps((__m256)rows, 1));
+}
+static inline F low_in_turns(F a, F b) { return (F)_mm256_unpacklo_ps((__m256)a, (__m256)b); }
+static inline F high_in_turns(F a, F b) { return (F)_mm256_unpackhi_ps((__m256)a, (__m256)b); }
+static inline F low_pairs(F a, F b) { return (F)_mm256_shuffle_ps((__m256)a, (__m256)b, 0x44); }
+static inline F high_pairs(F a, F b) { return (F)_mm256_shuffle_ps((__m256)a, (__m256)b, 0xee); }
 
 struct Pointers {
     __m256i low, high;  // of the first and the last four lanes

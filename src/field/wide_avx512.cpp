@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Points through host bricks for AVX-512: 16 lanes.
+// Points and rays through host bricks for AVX-512: 16 lanes.
 
 #include "field/wide_isa.h"
 
@@ -19,5 +19,7 @@ namespace kiln::field::wide_avx512 {
 #include "field/wide_one.inl"
 
 #include "field/wide_polish.inl"
+
+#include "field/wide_rays.inl"
 
 }  // namespace kiln::field::wide_avx512

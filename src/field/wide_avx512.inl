@@ -48,9 +48,29 @@ static inline I gather_bytes(M m, const void* base, I index, I others) {
 }
 static inline int count(M m) { return __builtin_popcount(m); }
 static inline uint32_t bits(M m) { return m; }
-static inline M mask_of(uint32_t bits) { return M(bits); }
-static inline F expand(M m, F others, const float* from) { return (F)_mm512_mask_expandloadu_ps(f(others), m, from); }
-static inline I expand(M m, I others, const int32_t* from) { return (I)_mm512_mask_expandloadu_epi32(i(others), m, from); }
+// Lanes of a mask moved to the front, in their order.
+struct Packing {
+    M m;
+    explicit Packing(M of) : m(of) {}
+    I operator()(I v) const { return (I)_mm512_maskz_compress_epi32(m, i(v)); }
+    F operator()(F v) const { return (F)_mm512_maskz_compress_ps(m, f(v)); }
+};
+
+// See wide_avx2.cpp: of lanes k, k + 4, k + 8, k + 12.
+static inline F rows_from(const float* const (&at)[kLanes], int k, int first) {
+    const __m512 a = _mm512_insertf32x4(_mm512_castps128_ps512(_mm_load_ps(at[k] + first)), _mm_load_ps(at[k + 4] + first), 1);
+    return (F)_mm512_insertf32x4(_mm512_insertf32x4(a, _mm_load_ps(at[k + 8] + first), 2), _mm_load_ps(at[k + 12] + first), 3);
+}
+static inline void rows_to(float* const (&at)[kLanes], int k, int first, F rows) {
+    _mm_store_ps(at[k] + first, _mm512_castps512_ps128(f(rows)));
+    _mm_store_ps(at[k + 4] + first, _mm512_extractf32x4_ps(f(rows), 1));
+    _mm_store_ps(at[k + 8] + first, _mm512_extractf32x4_ps(f(rows), 2));
+    _mm_store_ps(at[k + 12] + first, _mm512_extractf32x4_ps(f(rows), 3));
+}
+static inline F low_in_turns(F a, F b) { return (F)_mm512_unpacklo_ps(f(a), f(b)); }
+static inline F high_in_turns(F a, F b) { return (F)_mm512_unpackhi_ps(f(a), f(b)); }
+static inline F low_pairs(F a, F b) { return (F)_mm512_shuffle_ps(f(a), f(b), 0x44); }
+static inline F high_pairs(F a, F b) { return (F)_mm512_shuffle_ps(f(a), f(b), 0xee); }
 
 struct Pointers {
     __m512i low, high;  // of the first and the last eight lanes

@@ -26,7 +26,16 @@ static inline I gather_bytes(M m, const void* base, I index, I others) {
     return others;
 }
 static inline uint32_t bits(M m) { return uint32_t(_mm_movemask_ps((__m128)m)); }
+static inline I widened(const uint8_t (&of)[kLanes]) { return I{of[0], of[1], of[2], of[3]}; }
 static inline int count(M m) { return int(0x4332322132212110u >> (4 * bits(m)) & 15); }
+
+// See wide_avx2.cpp: of lane k.
+static inline F rows_from(const float* const (&at)[kLanes], int k, int first) { return (F)_mm_load_ps(at[k] + first); }
+static inline void rows_to(float* const (&at)[kLanes], int k, int first, F rows) { _mm_store_ps(at[k] + first, (__m128)rows); }
+static inline F low_in_turns(F a, F b) { return (F)_mm_unpacklo_ps((__m128)a, (__m128)b); }
+static inline F high_in_turns(F a, F b) { return (F)_mm_unpackhi_ps((__m128)a, (__m128)b); }
+static inline F low_pairs(F a, F b) { return (F)_mm_shuffle_ps((__m128)a, (__m128)b, 0x44); }
+static inline F high_pairs(F a, F b) { return (F)_mm_shuffle_ps((__m128)a, (__m128)b, 0xee); }
 
 struct Pointers {
     const std::byte* at[kLanes];

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Entry points of each instruction set (AVX-512 has one for points and one for rays), and what every wide_*.cpp includes before opening its namespace.
+// Entry points of each instruction set, and what every wide_*.cpp includes before opening its namespace.
 #pragma once
 
 #include "field/brick_content.h"
@@ -10,19 +10,19 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
-#define KILN_DECLARE_WIDE(name)                                                                        \
-    namespace kiln::field::name {                                                                      \
-    float distance(const WideView& view, const vec3& p);                                               \
-    void distances(const WideView& view, const sdf::Points& points, float* out);                       \
-    void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes); \
-    void polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z);                 \
-    int polish_steps(RayPolish& rays, int count, const float* metres);                                 \
-    void polish_places(RayPolish& rays, int count);                                                    \
+#define KILN_DECLARE_WIDE(name)                                                                 \
+    namespace kiln::field::name {                                                               \
+    float distance(const WideView& view, const vec3& p);                                        \
+    void distances(const WideView& view, const sdf::Points& points, float* out);                \
+    void march(const WideView& view, WideRay* rays, int count, MarchHit* hits, RayNote* notes); \
+    void polish_looks(const RayPolish& rays, int count, float* x, float* y, float* z);          \
+    int polish_steps(RayPolish& rays, int count, const float* metres);                          \
+    void polish_places(RayPolish& rays, int count);                                             \
     }
 KILN_DECLARE_WIDE(wide_scalar)
 KILN_DECLARE_WIDE(wide_sse4)
 KILN_DECLARE_WIDE(wide_avx2)
 KILN_DECLARE_WIDE(wide_avx512)
-KILN_DECLARE_WIDE(wide_avx512_rays)
 #undef KILN_DECLARE_WIDE

@@ -20,16 +20,24 @@ static inline M both(M a, M b) { return a & b; }
 static inline M either(M a, M b) { return a | b; }
 static inline M without(M a, M b) { return a & ~b; }
 
-static inline M mask_of(uint32_t bits) {
-    M lanes{};
-    for (int lane = 0; lane < kLanes; ++lane) lanes[lane] = 1 << lane;
-    return (lanes & int32_t(bits)) != 0;
-}
-// Lanes of m take one element after another.
-template <typename V, typename T>
-static inline V expand(M m, V others, const T* from) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-        if (m[lane] != 0) others[lane] = *from++;
+static inline uint32_t bits(M m);
+static inline I widened(const uint8_t (&of)[kLanes]);
+
+// Lanes of a mask moved to the front, in their order.
+struct PackedLanes {
+    uint8_t of[1 << kLanes][kLanes];
+    constexpr PackedLanes() : of() {
+        for (int mask = 0; mask < 1 << kLanes; ++mask) {
+            for (int lane = 0, to = 0; lane < kLanes; ++lane) {
+                if ((mask >> lane & 1) != 0) of[mask][to++] = uint8_t(lane);
+            }
+        }
     }
-    return others;
-}
+};
+constexpr PackedLanes kPackedLanes;
+struct Packing {
+    I from;
+    explicit Packing(M m) : from(widened(kPackedLanes.of[bits(m)])) {}
+    I operator()(I v) const { return __builtin_shuffle(v, from); }
+    F operator()(F v) const { return __builtin_shuffle(v, from); }
+};

@@ -45,30 +45,17 @@ static inline F slope_of(const WideCubic& c, F s) {
     return 3.0f * ((c.b1 - c.b0) * r * r + 2.0f * (c.b2 - c.b1) * r * s + (c.b3 - c.b2) * s * s);
 }
 
-// `enough`: a step this short is the last one.
-static inline F bracketed(const WideCubic& c, M active, F lo, F hi, F value_lo, F value_hi, float enough) {
-    F s = lo + (hi - lo) * (value_lo / (value_lo - value_hi));
-    for (int i = 0; i < 24 && any(active); ++i) {
-        const F value = value_of(c, s);
-        const M above = lt(number(0), value);
-        lo = select(both(active, above), s, lo);
-        hi = select(without(active, above), s, hi);
-        const F slope = slope_of(c, s);
-        F next = select(lt(slope, number(0)), s - value / slope, lo);
-        next = select(both(le(lo, next), le(next, hi)), next, 0.5f * (lo + hi));
-        const F moved = abs(next - s);
-        s = select(active, next, s);
-        active = without(active, lt(moved, number(enough)));
-    }
-    return s;
-}
-
-static inline F first_root(const WideCubic& c, M active, float enough) {
+// Where a cubic first comes to 0 in [0, 1]: between `lo` and `hi`, where it has these values; at `lo` where that of `lo` is none above 0.
+struct WideBracket {
+    F lo, hi, value_lo, value_hi;
+};
+// Answers the lanes of `active` where it does.
+static inline M bracket_of(const WideCubic& c, M active, WideBracket& out) {
     const F one = number(1), zero = number(0);
-    const M start = le(c.b0, zero);
-    F root = select(start, zero, number(kNoRoot));
+    const M start = both(active, le(c.b0, zero));
+    out = {zero, zero, c.b0, c.b0};
     active = without(without(active, start), lt(zero, min(min(c.b1, c.b2), c.b3)));
-    if (!any(active)) return root;
+    if (!any(active)) return start;
     const F d0 = c.b1 - c.b0;
     const F h = (c.b2 - c.b1) - d0;
     const F a = (c.b3 - c.b2) - (c.b2 - c.b1) - h;
@@ -87,21 +74,40 @@ static inline F first_root(const WideCubic& c, M active, float enough) {
     const M in_second = both(lt(first, one), le(value_second, zero));
     const M in_third = both(both(lt(first, one), lt(second, one)), le(c.b3, zero));
     const M found = both(active, either(either(in_first, in_second), in_third));
-    if (!any(found)) return root;
-    const F lo = select(in_first, zero, select(in_second, first, second));
-    const F hi = select(in_first, first, select(in_second, second, one));
-    const F value_lo = select(in_first, c.b0, select(in_second, value_first, value_second));
-    const F value_hi = select(in_first, value_first, select(in_second, value_second, c.b3));
-    return select(found, bracketed(c, found, lo, hi, value_lo, value_hi, enough), root);
+    const M at_zero = either(start, in_first);
+    out = {select(at_zero, zero, select(in_second, first, second)),
+           select(in_first, first, select(in_second, second, one)),
+           select(at_zero, c.b0, select(in_second, value_first, value_second)),
+           select(in_first, value_first, select(in_second, value_second, c.b3))};
+    return either(start, found);
+}
+
+// `enough`: a step this short is the last one.
+static inline F root_of(const WideCubic& c, const WideBracket& b, M active, float enough) {
+    const M start = le(b.value_lo, number(0));
+    active = without(active, start);
+    F lo = b.lo, hi = b.hi;
+    F s = select(start, lo, lo + (hi - lo) * (b.value_lo / (b.value_lo - b.value_hi)));
+    for (int i = 0; i < 24 && any(active); ++i) {
+        const F value = value_of(c, s);
+        const M above = lt(number(0), value);
+        lo = select(both(active, above), s, lo);
+        hi = select(without(active, above), s, hi);
+        const F slope = slope_of(c, s);
+        F next = select(lt(slope, number(0)), s - value / slope, lo);
+        next = select(both(le(lo, next), le(next, hi)), next, 0.5f * (lo + hi));
+        const F moved = abs(next - s);
+        s = select(active, next, s);
+        active = without(active, lt(moved, number(enough)));
+    }
+    return s;
 }
 
 static inline F leading(F a) { return floats_of(bits_of(a) & int32_t(0xfffff000)); }
 static inline F crossing(F plane, F high, F low, F inverse, M flat, float parallel) {
     return select(flat, number(parallel), ((plane - high) - low) * inverse);
 }
-static inline F texel_crossing(I texel, I whole, F part, F inverse, M flat, float parallel) {
-    return select(flat, number(parallel), (to_float(texel - whole) - part) * inverse);
-}
+static inline F texel_crossing(I texel, I whole, F part, F inverse) { return (to_float(texel - whole) - part) * inverse; }
 
 struct Counting {
     int32_t of[kLanes];
@@ -110,24 +116,154 @@ struct Counting {
     }
 };
 constexpr Counting kCounting;
+static inline M first_lanes(int count) { return lt(load(kCounting.of), splat(count)); }
 
-// Rays of one packet, texels counted from the grid's first.
-struct Packet {
-    I3 whole;
-    F3 part, direction, inverse;
-    M up_x, up_y, up_z;
-    M flat_x, flat_y, flat_z;  // parallel to the planes of an axis
-    I octant;                  // where its octant's bits are in the word of a free cell (ways.h)
+// What does not change along rays stays where it is, in rows of four numbers, a ray's four on one line of the cache: to move it with the rays
+// takes longer. Rows of four rays are a square of numbers; turned, each of its rows is a part of a register that has one number a ray.
+struct Quad {
+    F a, b, c, d;
 };
-static inline M select_lanes(M m, M a, M b) { return either(both(m, a), without(b, m)); }
-static inline Packet select(M m, const Packet& a, const Packet& b) {
-    return {select(m, a.whole, b.whole),         select(m, a.part, b.part),
-            select(m, a.direction, b.direction), select(m, a.inverse, b.inverse),
-            select_lanes(m, a.up_x, b.up_x),     select_lanes(m, a.up_y, b.up_y),
-            select_lanes(m, a.up_z, b.up_z),     select_lanes(m, a.flat_x, b.flat_x),
-            select_lanes(m, a.flat_y, b.flat_y), select_lanes(m, a.flat_z, b.flat_z),
-            select(m, a.octant, b.octant)};
+static inline Quad turned(const Quad& q) {
+    const F ab = low_in_turns(q.a, q.b), cd = low_in_turns(q.c, q.d);
+    const F ab_high = high_in_turns(q.a, q.b), cd_high = high_in_turns(q.c, q.d);
+    return {low_pairs(ab, cd), high_pairs(ab, cd), low_pairs(ab_high, cd_high), high_pairs(ab_high, cd_high)};
 }
+struct RayRows {
+    float* at[kLanes];
+    RayRows(WideRay* rays, I numbers) {
+        int32_t number[kLanes];
+        std::memcpy(number, &numbers, sizeof number);
+        for (int i = 0; i < kLanes; ++i) at[i] = rays[number[i]].inverse;
+    }
+    Quad get(int first) const {
+        return turned({rows_from(at, 0, first), rows_from(at, 1, first), rows_from(at, 2, first), rows_from(at, 3, first)});
+    }
+    void put(int first, const Quad& numbers) const {
+        const Quad rows = turned(numbers);
+        rows_to(at, 0, first, rows.a), rows_to(at, 1, first, rows.b), rows_to(at, 2, first, rows.c), rows_to(at, 3, first, rows.d);
+    }
+};
+// Of WideRay. What is not asked for is not read.
+struct Course {
+    F3 inverse;  // kFarVoxels along axes to whose planes the ray is parallel, so that it crosses none
+    F t_max;
+    F3 direction;
+    I octant;  // where its octant's bits are in the word of a free cell (ways.h)
+    F3 part;
+    I3 whole;
+    explicit Course(const RayRows& rows) {
+        const Quad a = rows.get(0), b = rows.get(4), c = rows.get(8), d = rows.get(12);
+        inverse = {a.a, a.b, a.c}, t_max = a.d;
+        direction = {b.a, b.b, b.c}, octant = bits_of(b.d);
+        part = {c.a, c.b, c.c};
+        whole = {bits_of(d.a), bits_of(d.b), bits_of(d.c)};
+    }
+    M up_x() const { return lt(number(0), inverse.x); }
+    M up_y() const { return lt(number(0), inverse.y); }
+    M up_z() const { return lt(number(0), inverse.z); }
+    M flat_x() const { return eq(inverse.x, number(kFarVoxels)); }
+    M flat_y() const { return eq(inverse.y, number(kFarVoxels)); }
+    M flat_z() const { return eq(inverse.z, number(kFarVoxels)); }
+};
+
+// A ray between bricks. `each` gives all of a record's registers in their order.
+struct Seeker {
+    I number;  // in the list
+    F t;       // where it has come to, by cells
+    I3 cell;
+    I way;  // the cell's word (ways.h); 0 where it has been looked at and the next one is to come
+
+    template <typename Self, typename Fn>
+    [[gnu::always_inline]] static void each(Self& r, Fn&& fn) {
+        fn(r.number), fn(r.t), fn(r.cell.x), fn(r.cell.y), fn(r.cell.z), fn(r.way);
+    }
+};
+// A ray in a brick.
+struct Walker {
+    I number;
+    F t;  // as it was before
+    I3 cell;
+    F3 high, low;  // where it is at t_base, from the brick's first texel
+    F t_base;
+    F enter, leave;  // from t_base: into the voxel, out of the brick
+    F past;          // there no voxel with a solid corner comes any more
+    I3 voxel;
+    I address[2];  // of its codes: lower and upper half
+
+    template <typename Self, typename Fn>
+    [[gnu::always_inline]] static void each(Self& r, Fn&& fn) {
+        fn(r.number), fn(r.t), fn(r.cell.x), fn(r.cell.y), fn(r.cell.z);
+        fn(r.high.x), fn(r.high.y), fn(r.high.z), fn(r.low.x), fn(r.low.y), fn(r.low.z), fn(r.t_base);
+        fn(r.enter), fn(r.leave), fn(r.past), fn(r.voxel.x), fn(r.voxel.y), fn(r.voxel.z), fn(r.address[0]), fn(r.address[1]);
+    }
+};
+// A ray that hits in a voxel; where remains to be seen.
+struct Striker {
+    I number;
+    I3 cell, voxel;
+    F3 high, low;  // see Walker
+    F t_base, enter, exit;
+    WideCubic cubic;
+    WideBracket root;
+
+    template <typename Self, typename Fn>
+    [[gnu::always_inline]] static void each(Self& r, Fn&& fn) {
+        fn(r.number), fn(r.cell.x), fn(r.cell.y), fn(r.cell.z), fn(r.voxel.x), fn(r.voxel.y), fn(r.voxel.z);
+        fn(r.high.x), fn(r.high.y), fn(r.high.z), fn(r.low.x), fn(r.low.y), fn(r.low.z), fn(r.t_base), fn(r.enter), fn(r.exit);
+        fn(r.cubic.b0), fn(r.cubic.b1), fn(r.cubic.b2), fn(r.cubic.b3);
+        fn(r.root.lo), fn(r.root.hi), fn(r.root.value_lo), fn(r.root.value_hi);
+    }
+};
+
+// Rays that wait for the same.
+constexpr int kMostUnderWay = 512;
+
+template <typename Record>
+struct RayList {
+    static constexpr int kFields = int(sizeof(Record) / sizeof(I));
+    int size = 0;
+    alignas(64) int32_t of[kFields][kMostUnderWay + kLanes];
+    RayList() {}  // `of` stays as it is: clearing it for each block of rays would take longer than reading what it has
+
+    [[gnu::always_inline]] Record from(int first) const {
+        Record r;
+        int field = 0;
+        Record::each(r, [&](auto& v) __attribute__((always_inline)) { std::memcpy(&v, of[field++] + first, sizeof v); });
+        return r;
+    }
+    // Lanes of m, at the end. Behind them as many may be overwritten as a register has.
+    [[gnu::always_inline]] void add(const Record& r, M m) {
+        const Packing packing(m);
+        const int end = size;
+        int field = 0;
+        Record::each(r, [&](const auto& v) __attribute__((always_inline)) {
+            const auto packed = packing(v);
+            std::memcpy(of[field++] + end, &packed, sizeof packed);
+        });
+        size = end + count(m);
+    }
+    // All rays in full registers, and with `rest` those left too, to `step`, which may add here those that stay: they take the places of
+    // those that were read.
+    template <typename Fn>
+    void pass(bool rest, Fn&& step) {
+        const int had = size, full = had / kLanes * kLanes;
+        size = 0;
+        for (int first = 0; first < full; first += kLanes) {
+            Record r = from(first);
+            step(r, all());
+        }
+        if (full == had) return;
+        Record r = from(full);
+        const M left = first_lanes(had - full);
+        if (rest) {
+            // The other lanes are to have numbers of rays, too.
+            Record::each(r, [&](auto& v) { v = select(left, v, std::remove_reference_t<decltype(v)>{}); });
+            step(r, left);
+        } else {
+            add(r, left);
+        }
+    }
+};
 
 // The plane through which a ray leaves a voxel, of one axis; the brick's own faces are pushed out by kFaceOverlap.
 static inline F exit_plane(M up, I voxel) {
@@ -138,10 +274,6 @@ static inline F exit_plane(M up, I voxel) {
 static inline F entry_plane(M up, I voxel) { return exit_plane(without(all(), up), voxel); }
 static inline I stepped(M m, M up, I voxel) { return select(m, voxel + select(up, splat(1), splat(-1)), voxel); }
 
-struct WideBrickRay {
-    F3 high, low, lead, rest;
-    F t_base;
-};
 static inline void rebase(I whole, F part, F direction, F t, F& high, F& low) {
     const F lead = leading(direction);
     const F a = to_float(whole), b = lead * t;
@@ -151,210 +283,177 @@ static inline void rebase(I whole, F part, F direction, F t, F& high, F& low) {
     high = sum;
     low = ((direction - lead) * t + lost) + part;
 }
-static inline WideBrickRay brick_ray_of(const Packet& ray, I3 texel) {
-    const I3 away{ray.whole.x - texel.x, ray.whole.y - texel.y, ray.whole.z - texel.z};
-    const F3 d = ray.direction;
-    const F middle = (3.5f - ray.part.x - to_float(away.x)) * d.x + (3.5f - ray.part.y - to_float(away.y)) * d.y +
-                     (3.5f - ray.part.z - to_float(away.z)) * d.z;
-    WideBrickRay out;
-    out.t_base = leading(middle);
-    out.lead = {leading(d.x), leading(d.y), leading(d.z)};
-    out.rest = {d.x - out.lead.x, d.y - out.lead.y, d.z - out.lead.z};
-    rebase(away.x, ray.part.x, d.x, out.t_base, out.high.x, out.low.x);
-    rebase(away.y, ray.part.y, d.y, out.t_base, out.high.y, out.low.y);
-    rebase(away.z, ray.part.z, d.z, out.t_base, out.high.z, out.low.z);
-    return out;
-}
-static inline F coordinate(F from, F high, F low, F lead, F rest, F s) {
-    const F c = leading(s);
+static inline F coordinate(F from, F high, F low, F direction, F s) {
+    const F lead = leading(direction), rest = direction - lead, c = leading(s);
     const F large = (high - from) + lead * c;
     const F small = low + (rest * c + (lead + rest) * (s - c));
     return large + small;
 }
-static inline WideBrickRay select(M m, const WideBrickRay& a, const WideBrickRay& b) {
-    return {select(m, a.high, b.high), select(m, a.low, b.low), select(m, a.lead, b.lead), select(m, a.rest, b.rest),
-            select(m, a.t_base, b.t_base)};
-}
-static inline F3 point_in_voxel(const WideBrickRay& r, I3 voxel, F s) {
-    const auto one = [&](I v, F high, F low, F lead, F rest) {
-        return min(max(coordinate(to_float(v), high, low, lead, rest, s), number(-kFaceOverlap)), number(1.0f + kFaceOverlap));
+static inline F3 point_in_voxel(I3 voxel, F3 high, F3 low, F3 direction, F s) {
+    const auto one = [s](I v, F h, F l, F d) {
+        return min(max(coordinate(to_float(v), h, l, d, s), number(-kFaceOverlap)), number(1.0f + kFaceOverlap));
     };
-    return {one(voxel.x, r.high.x, r.low.x, r.lead.x, r.rest.x), one(voxel.y, r.high.y, r.low.y, r.lead.y, r.rest.y),
-            one(voxel.z, r.high.z, r.low.z, r.lead.z, r.rest.z)};
+    return {one(voxel.x, high.x, low.x, direction.x), one(voxel.y, high.y, low.y, direction.y), one(voxel.z, high.z, low.z, direction.z)};
 }
 static inline I cell_of(I whole, F part, F direction, F t) {
     return to_int(floor((to_float(whole) + (part + direction * t)) * kCellsPerVoxel));
 }
 
-// Rays under way, one a lane. What they have to do next differs: look at the next cell, enter a brick, walk its voxels, solve a voxel's cubic.
-// All that wait for the same do it together, the most first; a lane that is done takes the next ray of the list.
-constexpr int kPageWords = int(std::tuple_size_v<WidePage>);
-
+// Rays under way. What they have to do next differs: look at the next cell, enter a brick, walk its voxels, solve a voxel's cubic. Those that
+// wait for the same are in one list, and a list is gone through by full registers, each of its rays one step on: registers of one pass do not
+// wait for each other.
 template <bool Half>
 struct Marching {
     const WideView& view;
-    const WideRays& list;
+    WideRay* const rays;
     const int total;
     MarchHit* const hits;
     RayNote* const notes;
     int next = 0;
-
-    // By lane:
-    I number_in_list{};
-    Packet packet{};
-    F t_max{}, t{};  // t: where the ray has come to, by cells
-    I3 cell{};
-    I reach{};       // cells further on that are free too
-    I box{};         // of the cell's brick, where one was met
-    const std::byte* bricks[kLanes] = {};  // codes
-    WideBrickRay ray{};
-    F enter{}, leave{};  // from ray.t_base: into the voxel, out of the brick
-    F past{};            // there no voxel with a solid corner comes any more
-    I3 voxel{};
-    M looking = none(), testing = none(), entering = none(), walking = none(), solving = none();
-    M stepping = none();  // of those looking: not at the cell where they are, but at the next
+    RayList<Seeker> seeking{}, entering{};
+    RayList<Walker> walking{}, solving{};
+    RayList<Striker> striking{};
 
     void run() {
-        while (turn()) continue;
-    }
-    // Does what most lanes wait for, what is cheap before what is not; false when there is nothing left to do. The weights were found by
-    // trying.
-    bool turn() {
-        constexpr int kSpare = 3 * kLanes / 8;  // lanes that wait for new rays
-        const int look = count(looking), test = count(testing), in = count(entering), walk = count(walking), solve = count(solving);
-        const int busy = look + test + in + walk + solve;
-        if (next < total && kLanes - busy >= kSpare) {
-            take();
-        } else if (busy == 0) {
-            return false;
-        } else if (2 * solve >= max_of(max_of(2 * look, 2 * in), max_of(3 * walk, 2 * test))) {
-            solve_voxels();
-        } else if (2 * in >= 3 * max_of(max_of(look, walk), test)) {
-            enter_bricks();
-        } else if (test >= max_of(look, walk)) {
-            test_boxes();
-        } else if (2 * walk >= look) {
-            walk_voxels();
-        } else {
-            do {
-                look_at_cells();
-            } while (count(looking) > kLanes / 2);
+        for (;;) {
+            while (under_way() <= kMostUnderWay - kLanes && next < total) take();
+            if (under_way() == 0) return;
+            const bool rest = !any_full();  // nor will there be a full register any more
+            seeking.pass(rest, [this](Seeker& s, M m) { seek(s, m); });
+            entering.pass(rest, [this](const Seeker& s, M m) { enter(s, m); });
+            walking.pass(rest, [this](Walker& w, M m) { walk(w, m); });
+            solving.pass(rest, [this](Walker& w, M m) { solve(w, m); });
+            striking.pass(rest, [this](Striker& s, M m) { strike(s, m); });
         }
-        return true;
+    }
+    int under_way() const { return seeking.size + entering.size + walking.size + solving.size + striking.size; }
+    bool any_full() const {
+        return seeking.size >= kLanes || entering.size >= kLanes || walking.size >= kLanes || solving.size >= kLanes ||
+               striking.size >= kLanes;
     }
 
-    static int max_of(int a, int b) { return a < b ? b : a; }
+    Course course_of(I numbers) const { return Course(RayRows(rays, numbers)); }
 
-    // Gives the next rays to free lanes.
+    // The next rays, into the grid.
     void take() {
-        const M free = without(all(), either(either(either(looking, testing), entering), either(walking, solving)));
-        uint32_t lanes = bits(free);
-        int taken = __builtin_popcount(lanes);
-        for (; taken > total - next; --taken) lanes &= lanes - 1;
-        const M fresh = mask_of(lanes);
-        const auto rays = [&](const auto* from, auto others) { return expand(fresh, others, from + next); };
+        const M taken = first_lanes(total - next);
+        Seeker s;
+        s.number = min(load(kCounting.of) + next, splat(total - 1));
+        next += kLanes;
+        const RayRows rows(rays, s.number);
+        Course ray(rows);
         const auto component = [](F d) { return select(lt(abs(d), number(1e-12f)), number(0), d); };
-        const auto inverse = [](F d) { return select(eq(d, number(0)), number(0), 1.0f / d); };
-        Packet p;
-        p.whole = {rays(list.whole[0], splat(0)) - view.grid.cell_x * kBrickVoxels,
-                   rays(list.whole[1], splat(0)) - view.grid.cell_y * kBrickVoxels,
-                   rays(list.whole[2], splat(0)) - view.grid.cell_z * kBrickVoxels};
-        p.part = {rays(list.part[0], number(0)), rays(list.part[1], number(0)), rays(list.part[2], number(0))};
-        p.direction = {component(rays(list.direction[0], number(0))), component(rays(list.direction[1], number(0))),
-                       component(rays(list.direction[2], number(0)))};
-        p.inverse = {inverse(p.direction.x), inverse(p.direction.y), inverse(p.direction.z)};
-        p.flat_x = eq(p.inverse.x, number(0));
-        p.flat_y = eq(p.inverse.y, number(0));
-        p.flat_z = eq(p.inverse.z, number(0));
-        p.up_x = lt(number(0), p.inverse.x);
-        p.up_y = lt(number(0), p.inverse.y);
-        p.up_z = lt(number(0), p.inverse.z);
+        ray.direction = {component(ray.direction.x), component(ray.direction.y), component(ray.direction.z)};
+        const auto inverse = [](F d) { return select(eq(d, number(0)), number(kFarVoxels), 1.0f / d); };
+        ray.inverse = {inverse(ray.direction.x), inverse(ray.direction.y), inverse(ray.direction.z)};
+        const M up_x = ray.up_x(), up_y = ray.up_y(), up_z = ray.up_z();
         const auto bit = [](M up, int octant) { return select(up, splat(way_shift(octant)), splat(0)); };
-        p.octant = bit(p.up_x, 1) + bit(p.up_y, 2) + bit(p.up_z, 4);
-        packet = select(fresh, p, packet);
-        number_in_list = select(fresh, expand(fresh, splat(0), kCounting.of) + next, number_in_list);
-        t_max = rays(list.t_max, t_max);
-        next += taken;
+        ray.octant = bit(up_x, 1) + bit(up_y, 2) + bit(up_z, 4);
+        rows.put(0, {ray.inverse.x, ray.inverse.y, ray.inverse.z, ray.t_max});
+        rows.put(4, {ray.direction.x, ray.direction.y, ray.direction.z, floats_of(ray.octant)});
 
-        // Into the grid.
         const GridParams& g = view.grid;
-        F from = number(0), end = t_max;
-        const auto clip = [&](M up, int cells, I whole_texel, F in_texel, F inverse_direction, M flat) {
+        F from = number(0), end = ray.t_max;
+        const auto clip = [&](M up, int cells, I whole, F part, F over, M flat) {
             const I wide = splat(cells * kBrickVoxels);
-            from = max(from, texel_crossing(select(up, splat(0), wide), whole_texel, in_texel, inverse_direction, flat, -kFarVoxels));
-            end = min(end, texel_crossing(select(up, wide, splat(0)), whole_texel, in_texel, inverse_direction, flat, kFarVoxels));
+            from = max(from, select(flat, number(-kFarVoxels), texel_crossing(select(up, splat(0), wide), whole, part, over)));
+            end = min(end, select(flat, number(kFarVoxels), texel_crossing(select(up, wide, splat(0)), whole, part, over)));
         };
-        clip(packet.up_x, g.size_x, packet.whole.x, packet.part.x, packet.inverse.x, packet.flat_x);
-        clip(packet.up_y, g.size_y, packet.whole.y, packet.part.y, packet.inverse.y, packet.flat_y);
-        clip(packet.up_z, g.size_z, packet.whole.z, packet.part.z, packet.inverse.z, packet.flat_z);
-        M in = both(fresh, le(from, end));
-        t = select(in, from, t);
-        const auto enter_axis = [&](I& c, I whole_texel, F in_texel, F along, int size) {
-            const I first = select(in, cell_of(whole_texel, in_texel, along, t), splat(0));
+        clip(up_x, g.size_x, ray.whole.x, ray.part.x, ray.inverse.x, ray.flat_x());
+        clip(up_y, g.size_y, ray.whole.y, ray.part.y, ray.inverse.y, ray.flat_y());
+        clip(up_z, g.size_z, ray.whole.z, ray.part.z, ray.inverse.z, ray.flat_z());
+        M in = both(taken, le(from, end));
+        s.t = select(in, from, number(0));
+        const auto enter_axis = [&](I whole, F part, F along, int size) {
+            const I first = select(in, cell_of(whole, part, along, s.t), splat(0));
             const M outside = either(lt(first, splat(0)), lt(splat(size - 1), first));
             in = without(in, both(eq(along, number(0)), outside));
-            c = select(in, min(max(first, splat(0)), splat(size - 1)), c);  // on the other axes rounding may have put it just outside
+            return min(max(first, splat(0)), splat(size - 1));  // on the other axes rounding may have put it just outside
         };
-        enter_axis(cell.x, packet.whole.x, packet.part.x, packet.direction.x, g.size_x);
-        enter_axis(cell.y, packet.whole.y, packet.part.y, packet.direction.y, g.size_y);
-        enter_axis(cell.z, packet.whole.z, packet.part.z, packet.direction.z, g.size_z);
-        looking = either(looking, in);
-        stepping = without(stepping, in);
+        s.cell.x = enter_axis(ray.whole.x, ray.part.x, ray.direction.x, g.size_x);
+        s.cell.y = enter_axis(ray.whole.y, ray.part.y, ray.direction.y, g.size_y);
+        s.cell.z = enter_axis(ray.whole.z, ray.part.z, ray.direction.z, g.size_z);
+        look(s, ray, in);
     }
 
-    void look_at_cells() {
-        looking = without(looking, without(both(looking, stepping), step_cells(both(looking, stepping))));
-        const I at = (cell.z * view.grid.size_y + cell.y) * view.grid.size_x + cell.x;
-        const I way = gather_bytes(view.ways, select(looking, at, splat(0)) << 2);
-        const M arrived = both(looking, lt(way, splat(0)));  // kWaySolid
-        testing = either(testing, arrived);
-        box = select(arrived, way, box);
-        looking = without(looking, arrived);
-        const M inside = both(looking, has(way, kWayInside));
+    // To the next cell that may not be free.
+    void seek(Seeker& s, M m) {
+        const Course ray = course_of(s.number);
+        m = step_cells(s, ray, m);
+        look(s, ray, m);
+    }
+
+    void look(Seeker& s, const Course& ray, M m) {
+        const I at = (s.cell.z * view.grid.size_y + s.cell.y) * view.grid.size_x + s.cell.x;
+        Lanes ways(select(m, at, splat(0)));
+        for (int i = 0; i < kLanes; ++i) ways[i] = int32_t(view.ways[ways[i]]);  // a gather takes longer
+        s.way = ways.all();
+        const M solid = both(m, lt(s.way, splat(0)));  // kWaySolid
+        m = without(m, solid);
+        const M inside = both(m, lt(s.way << 1, splat(0)));  // kWayInside
         if (any(inside)) {
-            write(inside, kMarchInside, t, {splat(0), splat(0), splat(0)}, {number(0), number(0), number(0)});
-            looking = without(looking, inside);
+            write(s, inside, kMarchInside, s.t, {splat(0), splat(0), splat(0)}, {number(0), number(0), number(0)});
+            m = without(m, inside);
         }
-        reach = (way >> packet.octant) & kWayReach;  // that of lanes elsewhere is set when they come back
-        stepping = looking;
+        if (any(solid)) {
+            const M meets = meets_box(s, ray, solid);
+            entering.add(s, meets);
+            const M passes = without(solid, meets);
+            s.way = select(passes, splat(0), s.way);
+            m = either(m, passes);
+        }
+        seeking.add(s, m);
     }
 
     // Leaves the cube of free cells that each lane's cell begins; answers the lanes that are in the grid still.
-    M step_cells(M m) {
-        const auto border = [&](M up, I c) { return select(up, c + reach + 1, c - reach); };
-        const I border_x = border(packet.up_x, cell.x), border_y = border(packet.up_y, cell.y),
-                border_z = border(packet.up_z, cell.z);
-        const F out_x = texel_crossing(border_x * kBrickVoxels, packet.whole.x, packet.part.x, packet.inverse.x, packet.flat_x, kFarVoxels);
-        const F out_y = texel_crossing(border_y * kBrickVoxels, packet.whole.y, packet.part.y, packet.inverse.y, packet.flat_y, kFarVoxels);
-        const F out_z = texel_crossing(border_z * kBrickVoxels, packet.whole.z, packet.part.z, packet.inverse.z, packet.flat_z, kFarVoxels);
+    M step_cells(Seeker& s, const Course& ray, M m) const {
+        const M up_x = ray.up_x(), up_y = ray.up_y(), up_z = ray.up_z();
+        const I reach = (s.way >> ray.octant) & kWayReach, beyond = reach + 1, before = splat(0) - reach;
+        const I border_x = s.cell.x + select(up_x, beyond, before), border_y = s.cell.y + select(up_y, beyond, before),
+                border_z = s.cell.z + select(up_z, beyond, before);
+        const F out_x = texel_crossing(border_x * kBrickVoxels, ray.whole.x, ray.part.x, ray.inverse.x);
+        const F out_y = texel_crossing(border_y * kBrickVoxels, ray.whole.y, ray.part.y, ray.inverse.y);
+        const F out_z = texel_crossing(border_z * kBrickVoxels, ray.whole.z, ray.part.z, ray.inverse.z);
         const F out_any = min(min(out_x, out_y), out_z);
-        t = select(m, max(t, out_any), t);
-        const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x);
-        const M by_z = without(without(all(), by_x), by_y);
-        if (any(both(m, lt(splat(0), reach)))) {  // the other axes may have moved within the cube
-            const auto drift = [&](I& c, M by, M up, M flat, I whole, F part, F direction) {
-                const I low = select(up, c, c - reach), high = select(up, c + reach, c);
-                c = select(without(without(m, by), flat), min(max(cell_of(whole, part, direction, t), low), high), c);
-            };
-            drift(cell.x, by_x, packet.up_x, packet.flat_x, packet.whole.x, packet.part.x, packet.direction.x);
-            drift(cell.y, by_y, packet.up_y, packet.flat_y, packet.whole.y, packet.part.y, packet.direction.y);
-            drift(cell.z, by_z, packet.up_z, packet.flat_z, packet.whole.z, packet.part.z, packet.direction.z);
-        }
-        const auto leap = [&](I& c, M by, M up, I to) { c = select(both(m, by), select(up, to, to - 1), c); };
-        leap(cell.x, by_x, packet.up_x, border_x);
-        leap(cell.y, by_y, packet.up_y, border_y);
-        leap(cell.z, by_z, packet.up_z, border_z);
+        s.t = max(s.t, out_any);
+        const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x), by_z = without(all(), either(by_x, by_y));
+        // The other axes may have moved within the cube.
+        const auto next_cell = [&](I& c, M by, M up, I border, I whole, F part, F direction) {
+            const I low = select(up, c, border), high = select(up, border - 1, c);
+            const I drifted = min(max(cell_of(whole, part, direction, s.t), low), high);
+            c = select(by, select(up, border, border - 1), drifted);
+        };
+        next_cell(s.cell.x, by_x, up_x, border_x, ray.whole.x, ray.part.x, ray.direction.x);
+        next_cell(s.cell.y, by_y, up_y, border_y, ray.whole.y, ray.part.y, ray.direction.y);
+        next_cell(s.cell.z, by_z, up_z, border_z, ray.whole.z, ray.part.z, ray.direction.z);
         const GridParams& g = view.grid;
-        const M in_grid = both(ge0(min(min(cell.x, cell.y), cell.z)),
-                               both(both(lt(cell.x, splat(g.size_x)), lt(cell.y, splat(g.size_y))), lt(cell.z, splat(g.size_z))));
-        return without(both(m, in_grid), lt(t_max, t));
+        const M in_grid = both(both(below(s.cell.x, g.size_x), below(s.cell.y, g.size_y)), below(s.cell.z, g.size_z));
+        return without(both(m, in_grid), lt(ray.t_max, s.t));
     }
 
     // Lanes whose brick holds no hit go on to the next cell.
-    void go_on(M m) {
-        reach = select(m, splat(0), reach);
-        stepping = either(stepping, m);
-        looking = either(looking, m);
+    template <typename Record>
+    void go_on(const Record& r, M m) {
+        seeking.add({r.number, r.t, r.cell, splat(0)}, m);
+    }
+
+    static I box_corner(const Seeker& s, int shift) { return (s.way >> shift) & 7; }
+
+    // Whether a ray comes through the box of all voxels with a solid corner. Positions are rounded, so boxes are taken to be larger than they
+    // are.
+    static M meets_box(const Seeker& s, const Course& ray, M m) {
+        F in = number(0), out = ray.t_max;
+        const F margin = s.t * 1e-6f + 0.015625f;
+        const auto clip = [&](M up, I c, int low, int high, I whole, F part, F inverse) {
+            const I base = c * kBrickVoxels - whole, first = base + box_corner(s, low), last = base + box_corner(s, high) + 1;
+            const F more = abs(inverse) * margin;
+            in = max(in, (to_float(select(up, first, last)) - part) * inverse - more);
+            out = min(out, (to_float(select(up, last, first)) - part) * inverse + more);
+        };
+        clip(ray.up_x(), s.cell.x, 0, 9, ray.whole.x, ray.part.x, ray.inverse.x);
+        clip(ray.up_y(), s.cell.y, 3, 12, ray.whole.y, ray.part.y, ray.inverse.y);
+        clip(ray.up_z(), s.cell.z, 6, 15, ray.whole.z, ray.part.z, ray.inverse.z);
+        return both(m, le(in, out));
     }
 
     // cell_word_index().
@@ -363,82 +462,71 @@ struct Marching {
         return (page << 9) + ((c.z & 7) << 6) + ((c.y & 7) << 3) + (c.x & 7);
     }
 
-    I box_corner(int shift) const { return (box >> shift) & 7; }
-
-    // Rays that pass by the box of all voxels with a solid corner go on, the others enter the brick. Positions are rounded, so boxes are taken
-    // to be larger than they are.
-    void test_boxes() {
-        const M m = testing;
-        testing = none();
-        F in = number(0), out = t_max;
-        const F margin = t * 1e-6f + 0.015625f;
-        const auto clip = [&](M up, M flat, I c, int low, int high, I whole, F part, F inverse) {
-            const I first = c * kBrickVoxels - whole + box_corner(low), last = c * kBrickVoxels - whole + box_corner(high) + 1;
-            const F more = abs(inverse) * margin;
-            in = max(in, select(flat, number(-kFarVoxels), (to_float(select(up, first, last)) - part) * inverse - more));
-            out = min(out, select(flat, number(kFarVoxels), (to_float(select(up, last, first)) - part) * inverse + more));
-        };
-        clip(packet.up_x, packet.flat_x, cell.x, 0, 9, packet.whole.x, packet.part.x, packet.inverse.x);
-        clip(packet.up_y, packet.flat_y, cell.y, 3, 12, packet.whole.y, packet.part.y, packet.inverse.y);
-        clip(packet.up_z, packet.flat_z, cell.z, 6, 15, packet.whole.z, packet.part.z, packet.inverse.z);
-        const M meets = both(m, le(in, out));
-        entering = either(entering, meets);
-        go_on(without(m, meets));
-    }
-
     // Each to its first voxel of the box that holds all voxels with a solid corner, as if it had walked there.
-    void enter_bricks() {
-        const M m = entering;
-        entering = none();
-        const Lanes index(cell_word_index_of(cell));
+    void enter(const Seeker& s, M m) {
+        const Course ray = course_of(s.number);
+        const M up_x = ray.up_x(), up_y = ray.up_y(), up_z = ray.up_z();
+        Walker w;
+        w.number = s.number, w.t = s.t, w.cell = s.cell;
+        const Lanes index(cell_word_index_of(s.cell));
+        Lanes low_half(splat(0)), high_half(splat(0));
         each_lane(m, [&](int i) {
-            const WideEntry entry = (*view.pages[index.of[i] / kPageWords])[size_t(index.of[i] % kPageWords)];
-            bricks[i] = reinterpret_cast<const std::byte*>(uintptr_t(entry & kWideAddress));
-            __builtin_prefetch(bricks[i] - kSolidRowsBeforeCodes);
+            constexpr int kPageWords = int(std::tuple_size_v<WidePage>);
+            const WideEntry entry = (*view.pages[index.of[i] / kPageWords])[size_t(index.of[i] % kPageWords)] & kWideAddress;
+            low_half[i] = int32_t(uint32_t(entry)), high_half[i] = int32_t(entry >> 32);
+            __builtin_prefetch(reinterpret_cast<const std::byte*>(uintptr_t(entry)) - kSolidRowsBeforeCodes);
         });
-        ray = select(m, brick_ray_of(packet, {cell.x * kBrickVoxels, cell.y * kBrickVoxels, cell.z * kBrickVoxels}), ray);
+        w.address[0] = low_half.all(), w.address[1] = high_half.all();
+
+        const F3 d = ray.direction;
+        const auto away_of = [](I whole, I c) { return whole - c * kBrickVoxels; };
+        const I3 away{away_of(ray.whole.x, s.cell.x), away_of(ray.whole.y, s.cell.y), away_of(ray.whole.z, s.cell.z)};
+        w.t_base = leading((3.5f - ray.part.x - to_float(away.x)) * d.x + (3.5f - ray.part.y - to_float(away.y)) * d.y +
+                           (3.5f - ray.part.z - to_float(away.z)) * d.z);
+        rebase(away.x, ray.part.x, d.x, w.t_base, w.high.x, w.low.x);
+        rebase(away.y, ray.part.y, d.y, w.t_base, w.high.y, w.low.y);
+        rebase(away.z, ray.part.z, d.z, w.t_base, w.high.z, w.low.z);
         const F first = number(-kFaceOverlap), last = number(float(kBrickVoxels) + kFaceOverlap);
-        F in = 0.0f - ray.t_base, out = t_max - ray.t_base;
+        F in = 0.0f - w.t_base, out = ray.t_max - w.t_base;
         const auto clip = [&](M up, F high, F low, F inverse, M flat) {
             in = max(in, crossing(select(up, first, last), high, low, inverse, flat, -kFarVoxels));
             out = min(out, crossing(select(up, last, first), high, low, inverse, flat, kFarVoxels));
         };
-        clip(packet.up_x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
-        clip(packet.up_y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
-        clip(packet.up_z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
+        clip(up_x, w.high.x, w.low.x, ray.inverse.x, ray.flat_x());
+        clip(up_y, w.high.y, w.low.y, ray.inverse.y, ray.flat_y());
+        clip(up_z, w.high.z, w.low.z, ray.inverse.z, ray.flat_z());
 
-        const I3 low{box_corner(0), box_corner(3), box_corner(6)}, high{box_corner(9), box_corner(12), box_corner(15)};
+        const I3 low{box_corner(s, 0), box_corner(s, 3), box_corner(s, 6)}, high{box_corner(s, 9), box_corner(s, 12), box_corner(s, 15)};
         const auto to_box = [&](M up, I from, I to, F h, F l, F inverse, M flat) {
             return crossing(entry_plane(up, select(up, from, to)), h, l, inverse, flat, -kFarVoxels);
         };
         const auto from_box = [&](M up, I from, I to, F h, F l, F inverse, M flat) {
             return crossing(exit_plane(up, select(up, to, from)), h, l, inverse, flat, kFarVoxels);
         };
-        const F to_x = to_box(packet.up_x, low.x, high.x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
-        const F to_y = to_box(packet.up_y, low.y, high.y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
-        const F to_z = to_box(packet.up_z, low.z, high.z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
-        const F from_x = from_box(packet.up_x, low.x, high.x, ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x);
-        const F from_y = from_box(packet.up_y, low.y, high.y, ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y);
-        const F from_z = from_box(packet.up_z, low.z, high.z, ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z);
+        const F to_x = to_box(up_x, low.x, high.x, w.high.x, w.low.x, ray.inverse.x, ray.flat_x());
+        const F to_y = to_box(up_y, low.y, high.y, w.high.y, w.low.y, ray.inverse.y, ray.flat_y());
+        const F to_z = to_box(up_z, low.z, high.z, w.high.z, w.low.z, ray.inverse.z, ray.flat_z());
+        const F from_x = from_box(up_x, low.x, high.x, w.high.x, w.low.x, ray.inverse.x, ray.flat_x());
+        const F from_y = from_box(up_y, low.y, high.y, w.high.y, w.low.y, ray.inverse.y, ray.flat_y());
+        const F from_z = from_box(up_z, low.z, high.z, w.high.z, w.low.z, ray.inverse.z, ray.flat_z());
         const F to_any = max(max(to_x, to_y), to_z), from_any = min(min(from_x, from_y), from_z);
         const M skips = lt(in, to_any);
         // A walk ends where it comes to `out`, and one that has not begun may begin there.
         const M alive = without(without(m, lt(out, in)), both(skips, either(le(out, to_any), lt(from_any, to_any))));
 
-        const auto voxel_of = [&](F h, F l, F lead, F rest, F s) {
-            return to_int(min(max(coordinate(number(0), h, l, lead, rest, s), number(0)), number(6.5f)));
+        const auto voxel_of = [&](F h, F l, F along, F t) {
+            return to_int(min(max(coordinate(number(0), h, l, along, t), number(0)), number(6.5f)));
         };
-        I3 at{voxel_of(ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, in), voxel_of(ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, in),
-              voxel_of(ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, in)};
+        w.voxel = {voxel_of(w.high.x, w.low.x, d.x, in), voxel_of(w.high.y, w.low.y, d.y, in), voxel_of(w.high.z, w.low.z, d.z, in)};
         if (any(both(alive, skips))) {
             // Planes are crossed in the order of their crossings, those of x before those of y before those of z where they are equal: at
             // `to_any` all crossed before it are behind, and of those crossed right there all up to the last axis that enters the box.
             const M by_z = eq(to_any, to_z), by_y = either(by_z, eq(to_any, to_y));
-            const auto skip = [&](I& v, M up, M equal_too, F h, F l, F lead, F rest, F inverse, M flat) {
-                const I near = voxel_of(h, l, lead, rest, to_any);  // or next to it
+            const auto skip = [&](I& v, M up, M equal_too, F h, F l, F along, F inverse, M flat) {
+                const I near = voxel_of(h, l, along, to_any);  // or next to it
                 const auto crossed = [&](F plane, float parallel) {
-                    const F s = crossing(plane, h, l, inverse, flat, parallel);
-                    return either(lt(s, to_any), both(equal_too, eq(s, to_any)));
+                    const F t = crossing(plane, h, l, inverse, flat, parallel);
+                    return either(lt(t, to_any), both(equal_too, eq(t, to_any)));
                 };
                 const M ahead = crossed(exit_plane(up, near), kFarVoxels);
                 const M behind = without(all(), either(ahead, crossed(entry_plane(up, near), -kFarVoxels)));
@@ -448,78 +536,93 @@ struct Marching {
                 const I furthest = select(up, max(there, v), min(there, v));  // a walk never goes back
                 v = select(skips, furthest, v);
             };
-            skip(at.x, packet.up_x, all(), ray.high.x, ray.low.x, ray.lead.x, ray.rest.x, packet.inverse.x, packet.flat_x);
-            skip(at.y, packet.up_y, by_y, ray.high.y, ray.low.y, ray.lead.y, ray.rest.y, packet.inverse.y, packet.flat_y);
-            skip(at.z, packet.up_z, by_z, ray.high.z, ray.low.z, ray.lead.z, ray.rest.z, packet.inverse.z, packet.flat_z);
+            skip(w.voxel.x, up_x, all(), w.high.x, w.low.x, d.x, ray.inverse.x, ray.flat_x());
+            skip(w.voxel.y, up_y, by_y, w.high.y, w.low.y, d.y, ray.inverse.y, ray.flat_y());
+            skip(w.voxel.z, up_z, by_z, w.high.z, w.low.z, d.z, ray.inverse.z, ray.flat_z());
         }
-        voxel = select(m, at, voxel);
-        enter = select(m, select(skips, to_any, in), enter);
-        leave = select(m, out, leave);
-        past = select(m, from_any, past);
-        Lanes texel(texel_of(at));
-        each_lane(alive, [&](int i) {  // they will be read here or nearby
-            const std::byte* const row = bricks[i] + texel[i] * (Half ? 2 : 1);
+        w.enter = select(skips, to_any, in);
+        w.leave = out;
+        w.past = from_any;
+        const Addresses codes(w);
+        Lanes texel(texel_of(w.voxel));
+        each_lane(m, [&](int i) {  // they will be read here or nearby
+            const std::byte* const row = codes[i] + texel[i] * kBytes;
             __builtin_prefetch(row);
-            __builtin_prefetch(row + 72 * (Half ? 2 : 1));
+            __builtin_prefetch(row + 72 * kBytes);
         });
-        walking = either(walking, alive);
-        go_on(without(m, alive));
+        walking.add(w, alive);
+        go_on(w, without(m, alive));
     }
 
-    F exits(F& out_x, F& out_y, F& out_z) const {
-        out_x = crossing(exit_plane(packet.up_x, voxel.x), ray.high.x, ray.low.x, packet.inverse.x, packet.flat_x, kFarVoxels);
-        out_y = crossing(exit_plane(packet.up_y, voxel.y), ray.high.y, ray.low.y, packet.inverse.y, packet.flat_y, kFarVoxels);
-        out_z = crossing(exit_plane(packet.up_z, voxel.z), ray.high.z, ray.low.z, packet.inverse.z, packet.flat_z, kFarVoxels);
+    static F exits(const Walker& w, const Course& ray, F& out_x, F& out_y) {
+        const auto out = [](M up, I v, F high, F low, F inverse) { return ((exit_plane(up, v) - high) - low) * inverse; };
+        out_x = out(ray.up_x(), w.voxel.x, w.high.x, w.low.x, ray.inverse.x);
+        out_y = out(ray.up_y(), w.voxel.y, w.high.y, w.low.y, ray.inverse.y);
+        const F out_z = out(ray.up_z(), w.voxel.z, w.high.z, w.low.z, ray.inverse.z);
         return min(min(out_x, out_y), out_z);
     }
     // To the next voxel; answers the lanes that are in the brick still.
-    M step_voxels(M m, F out_any, F out_x, F out_y) {
-        enter = select(m, max(min(out_any, leave), enter), enter);
+    static M step_voxels(Walker& w, const Course& ray, M m, F out_any, F out_x, F out_y) {
+        w.enter = select(m, max(min(out_any, w.leave), w.enter), w.enter);
         const M by_x = eq(out_any, out_x), by_y = without(eq(out_any, out_y), by_x);
         const M by_z = without(without(all(), by_x), by_y);
-        voxel.x = stepped(both(m, by_x), packet.up_x, voxel.x);
-        voxel.y = stepped(both(m, by_y), packet.up_y, voxel.y);
-        voxel.z = stepped(both(m, by_z), packet.up_z, voxel.z);
-        const M outside = either(lt(min(min(voxel.x, voxel.y), voxel.z), splat(0)),
-                                 lt(splat(kBrickVoxels - 1), max(max(voxel.x, voxel.y), voxel.z)));
-        return without(m, either(le(leave, out_any), outside));
+        w.voxel.x = stepped(both(m, by_x), ray.up_x(), w.voxel.x);
+        w.voxel.y = stepped(both(m, by_y), ray.up_y(), w.voxel.y);
+        w.voxel.z = stepped(both(m, by_z), ray.up_z(), w.voxel.z);
+        const M outside = either(lt(min(min(w.voxel.x, w.voxel.y), w.voxel.z), splat(0)),
+                                 lt(splat(kBrickVoxels - 1), max(max(w.voxel.x, w.voxel.y), w.voxel.z)));
+        return without(m, either(le(w.leave, out_any), outside));
     }
 
     // Past a voxel without a solid corner, whose eight values are positive: it holds no root. Others wait to be solved.
-    void walk_voxels() {
-        F out_x, out_y, out_z;
-        const F out_any = exits(out_x, out_y, out_z);
-        const M here = without(walking, lt(past, out_any));
-        const Lanes rows(voxel.z * 8 + voxel.y), columns(voxel.x & 7);
-        uint32_t solid = 0;
-        each_lane(here, [&](int i) {
-            solid |= (uint32_t(bricks[i][rows.of[i] - kSolidRowsBeforeCodes]) >> columns.of[i] & 1) << i;
-        });
-        const M found = mask_of(solid);
-        solving = either(solving, found);
-        const M still = step_voxels(without(here, found), out_any, out_x, out_y);
-        go_on(without(without(walking, found), still));
-        walking = still;
+    void walk(Walker& w, M m) {
+        const Course ray = course_of(w.number);
+        F out_x, out_y;
+        const F out_any = exits(w, ray, out_x, out_y);
+        const M here = without(m, lt(w.past, out_any));
+        const Addresses codes(w);
+        const Lanes rows(w.voxel.z * 8 + w.voxel.y);
+        Lanes solid(splat(0));
+        each_lane(m, [&](int i) { solid[i] = int32_t(codes[i][rows.of[i] - kSolidRowsBeforeCodes]); });
+        const M found = both(here, without(all(), eq((solid.all() >> w.voxel.x) & 1, splat(0))));
+        solving.add(w, found);
+        const M still = step_voxels(w, ray, without(here, found), out_any, out_x, out_y);
+        walking.add(w, still);
+        go_on(w, without(without(m, found), still));
     }
 
-    // Reads for the lanes of `m`, one after another: about a third of all lanes, for which gathers take longer.
-    template <typename Fn>
-    static void each_lane(M m, Fn&& fn) {
-        for (uint32_t left = bits(m); left != 0; left &= left - 1) fn(__builtin_ctz(left));
-    }
+    static constexpr int kBytes = Half ? 2 : 1;
+
     struct Lanes {
         alignas(64) int32_t of[kLanes];
         explicit Lanes(I v) { std::memcpy(of, &v, sizeof of); }
         int32_t& operator[](int i) { return of[i]; }
         I all() const { return load(of); }
     };
+    // Of codes, by lane.
+    struct Addresses {
+        Lanes low, high;
+        explicit Addresses(const Walker& w) : low(w.address[0]), high(w.address[1]) {}
+        const std::byte* operator[](int i) const {
+            return reinterpret_cast<const std::byte*>(uintptr_t(uint64_t(uint32_t(high.of[i])) << 32 | uint32_t(low.of[i])));
+        }
+    };
+    // Reads for the lanes of `m`, one after another.
+    template <typename Fn>
+    static void each_lane(M m, Fn&& fn) {
+        if (bits(m) == bits(all())) {
+            for (int i = 0; i < kLanes; ++i) fn(i);
+        } else {
+            for (uint32_t left = bits(m); left != 0; left &= left - 1) fn(__builtin_ctz(left));
+        }
+    }
 
-    WideCorners corners_of(M m) const {
-        Lanes texel(texel_of(voxel));
+    static WideCorners corners_of(const Walker& w, M m) {
+        const Addresses codes(w);
+        Lanes texel(texel_of(w.voxel));
         Lanes v00(splat(0)), v10(splat(0)), v01(splat(0)), v11(splat(0));
         each_lane(m, [&](int i) {
-            constexpr int kBytes = Half ? 2 : 1;
-            const std::byte* const first = bricks[i] + texel[i] * kBytes;
+            const std::byte* const first = codes[i] + texel[i] * kBytes;
             const auto pair = [first](int32_t& to, int offset) { std::memcpy(&to, first + offset * kBytes, 2 * kBytes); };
             pair(v00[i], 0), pair(v10[i], 8), pair(v01[i], 64), pair(v11[i], 72);
         });
@@ -527,46 +630,50 @@ struct Marching {
                 values_of<Half>(v11.all())};
     }
 
-    void solve_voxels() {
-        const M m = solving;
-        solving = none();
-        F out_x, out_y, out_z;
-        const F out_any = exits(out_x, out_y, out_z);
-        const F exit = max(min(out_any, leave), enter);
-        const WideCorners corners = corners_of(m);
-        const WideCubic cubic = cubic_of(corners, point_in_voxel(ray, voxel, enter), point_in_voxel(ray, voxel, exit));
-        // Newton's steps: after one of a thousandth, what is left is a rounding. Whoever asks for notes moves the hit anyway.
-        const F root = first_root(cubic, m, notes != nullptr ? 1e-3f : 1e-6f);
-        const M hit = both(m, le(root, number(1)));
+    void solve(Walker& w, M m) {
+        const Course ray = course_of(w.number);
+        F out_x, out_y;
+        const F out_any = exits(w, ray, out_x, out_y);
+        const F exit = max(min(out_any, w.leave), w.enter);
+        const WideCorners corners = corners_of(w, m);
+        const auto point = [&](F s) { return point_in_voxel(w.voxel, w.high, w.low, ray.direction, s); };
+        const WideCubic cubic = cubic_of(corners, point(w.enter), point(exit));
+        WideBracket root;
+        const M hit = bracket_of(cubic, m, root);
+        if (any(hit))
+            striking.add({w.number, w.cell, w.voxel, w.high, w.low, w.t_base, w.enter, exit, cubic, root}, hit);
         if (notes != nullptr) {
             const F least = min(min(cubic.b0, cubic.b1), min(cubic.b2, cubic.b3));
             // Along a surface, be it a little towards it; and where texels may have lost some.
             constexpr float kAlong = 0.1f, kRounding = 0.02f;  // voxels
             const F lost = min(bend_of(corners) * 0.75f + kRounding, number(kNearPassVoxels));
             const M near = both(without(m, hit), both(lt(least, lost), le(cubic.b2, cubic.b3 + kAlong)));
-            if (any(near)) note_pass(near, least, ray.t_base + enter, ray.t_base + exit);
-        }
-        if (any(hit)) {
-            const F s = enter + root * (exit - enter);
-            const F3 p = point_in_voxel(ray, voxel, s);
-            const auto unit = [](F v) { return min(max(v, number(0)), number(1)); };
-            write(hit, kMarchHit, ray.t_base + s, voxel, {unit(p.x), unit(p.y), unit(p.z)});
-            if (notes != nullptr) note_slope(hit, slope_of(cubic, root) / max(exit - enter, number(1e-6f)));
+            if (any(near)) note_pass(w, near, least, w.t_base + w.enter, w.t_base + exit);
         }
         const M missed = without(m, hit);
-        const M still = step_voxels(missed, out_any, out_x, out_y);
-        walking = either(walking, still);
-        go_on(without(missed, still));
+        const M still = step_voxels(w, ray, missed, out_any, out_x, out_y);
+        walking.add(w, still);
+        go_on(w, without(missed, still));
     }
 
-    void note_pass(M m, F least, F from, F to) const {
+    void strike(const Striker& s, M m) const {
+        // Newton's steps: after one of a thousandth, what is left is a rounding. Whoever asks for notes moves the hit anyway.
+        const F root = root_of(s.cubic, s.root, m, notes != nullptr ? 1e-3f : 1e-6f);
+        const F t = s.enter + root * (s.exit - s.enter);
+        const F3 p = point_in_voxel(s.voxel, s.high, s.low, course_of(s.number).direction, t);
+        const auto unit = [](F v) { return min(max(v, number(0)), number(1)); };
+        write(s, m, kMarchHit, s.t_base + t, s.voxel, {unit(p.x), unit(p.y), unit(p.z)});
+        if (notes != nullptr) note_slope(s, m, slope_of(s.cubic, root) / max(s.exit - s.enter, number(1e-6f)));
+    }
+
+    void note_pass(const Walker& s, M m, F least, F from, F to) const {
         struct {
             int32_t number[kLanes], cell[3][kLanes];
             float least[kLanes], from[kLanes], to[kLanes];
         } lanes;
         const auto store = [](auto& there, auto v) { std::memcpy(&there, &v, sizeof v); };
-        store(lanes.number, number_in_list);
-        store(lanes.cell[0], cell.x), store(lanes.cell[1], cell.y), store(lanes.cell[2], cell.z);
+        store(lanes.number, s.number);
+        store(lanes.cell[0], s.cell.x), store(lanes.cell[1], s.cell.y), store(lanes.cell[2], s.cell.z);
         store(lanes.least, least), store(lanes.from, from), store(lanes.to, to);
         const GridParams& g = view.grid;
         each_lane(m, [&](int i) {
@@ -580,19 +687,20 @@ struct Marching {
         });
     }
 
-    void note_slope(M m, F slope) const {
-        Lanes order(number_in_list), slopes(bits_of(slope));
+    void note_slope(const Striker& s, M m, F slope) const {
+        Lanes order(s.number), slopes(bits_of(slope));
         each_lane(m, [&](int i) { notes[order[i]].slope = std::bit_cast<float>(slopes[i]); });
     }
 
-    void write(M m, int state, F at, I3 in_voxel, F3 p) const {
+    template <typename Record>
+    void write(const Record& s, M m, int state, F at, I3 in_voxel, F3 p) const {
         struct {
             int32_t number[kLanes], cell[3][kLanes], voxel[3][kLanes];
             float t[kLanes], p[3][kLanes];
         } lanes;
         const auto store = [](auto& to, auto v) { std::memcpy(&to, &v, sizeof v); };
-        store(lanes.number, number_in_list);
-        store(lanes.cell[0], cell.x), store(lanes.cell[1], cell.y), store(lanes.cell[2], cell.z);
+        store(lanes.number, s.number);
+        store(lanes.cell[0], s.cell.x), store(lanes.cell[1], s.cell.y), store(lanes.cell[2], s.cell.z);
         store(lanes.voxel[0], in_voxel.x), store(lanes.voxel[1], in_voxel.y), store(lanes.voxel[2], in_voxel.z);
         store(lanes.t, at);
         store(lanes.p[0], p.x), store(lanes.p[1], p.y), store(lanes.p[2], p.z);
@@ -610,7 +718,7 @@ struct Marching {
     }
 };
 
-void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits, RayNote* notes) {
+void march(const WideView& view, WideRay* rays, int count, MarchHit* hits, RayNote* notes) {
     for (int i = 0; notes != nullptr && i < count; ++i)
         for (NearPass& pass : notes[i].passes) pass.least = kNearPassVoxels;
     MarchHit miss{};
@@ -618,7 +726,7 @@ void march(const WideView& view, const WideRays& rays, int count, MarchHit* hits
     miss.slot = -1;
     for (int i = 0; i < count; ++i) {
         std::memcpy(hits + i, &miss, sizeof miss);  // whole: member by member is four times as many stores
-        hits[i].t = rays.t_max[i];
+        hits[i].t = rays[i].t_max;
     }
     if (view.texel_bytes == 2) {
         Marching<true>{view, rays, count, hits, notes}.run();
