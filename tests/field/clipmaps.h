@@ -5,6 +5,7 @@
 #include "field/clipmap.h"
 
 #include "base/hash.h"
+#include "rounds.h"
 #include "sdf/eval.h"
 #include "worlds.h"
 
@@ -131,7 +132,7 @@ inline void expect_is_its_program(const Clipmap& map, int level, const std::stri
     EXPECT_EQ(bricks, map.counts(level).bricks) << when << " level " << level;
 }
 inline void expect_is_its_program(const Clipmap& map, const std::string& when) {
-    for (int level = 0; level < map.level_count(); ++level) expect_is_its_program(map, level, when);
+    for (int level = 0; level < map.level_count(); level += kSanitized ? 3 : 1) expect_is_its_program(map, level, when);
 }
 
 // How many cells of a box, counted from the window's first, are of a kind, from sums over all boxes at the corner (F. Crow, "Summed-Area Tables for Texture Mapping",

@@ -4,6 +4,7 @@
 // a pixel, and the same picture at another resolution.
 #include "image/metrics.h"
 #include "render/lens.h"
+#include "rounds.h"
 
 #include <gtest/gtest.h>
 
@@ -68,7 +69,7 @@ TEST(BloomGate, ASparkKeepsItsEnergyAtEverySizeAndPlace) {
 TEST(BloomGate, ASparkThatMovesByPartsOfAPixelDoesNotFlicker) {
     for (const auto& [width, height] : kSizes) {
         double least = 1e30, most = 0, low = 1e30, high = 0;
-        for (int step = 0; step < 16; ++step) {
+        for (int step = 0; step < rounds(16); ++step) {
             const float share = float(step % 4) / 4;
             const int x = width / 2 + step / 4, y = height / 2;
             const Picture p = spark(width, height, x, y, 1000 * (1 - share), 1000 * share);

