@@ -250,7 +250,9 @@ private:
     // What takes the caches from an edit, before each.
     enum class Caches { Warm, Cold };
 
-    // Of ours and the peer's in turn: each makes all edits, one after another, before the other does. `fresh` stands for the picture that is drawn
+    // Of ours and the peer's in turn: each makes all edits, one after another, before the other does, and but in `edit.cold` twice, of
+    // which the second time counts: what the other did in between is gone from the caches, else a row would tell which peers are
+    // installed. `fresh` stands for the picture that is drawn
     // while a user edits: it holds what was before, so an edit copies the pages that it changes. What a turn's copy appends to it must copy whole,
     // once; a user's world has done so long before, and so has the copy when its first edit comes. A user's edits pay a little more than
     // these, for a picture that holds the last edit's pages too: one world throughout, copied before each edit, as `bench edits` has it.
@@ -261,29 +263,38 @@ private:
         State fresh{*scene_.program, made(scene_.program, scene_.options, threads), {}};
         for (uint32_t i = 0; i < scene_.edits.size(); ++i) fresh.rows.push_back(i);
         std::vector<uint64_t> other(caches == Caches::Cold ? kCacheWords : 0);
-        const auto least = [&](double& to, double seconds) { to = std::min(to, seconds); };
-        for (int turn = 0; turn < run_.options.runs; ++turn) {
+        const auto least = [](double& to, double seconds) { to = std::min(to, seconds); };
+        const auto ours = [&](Turns& to, bool first) {
             State state = fresh;
             apply(state, in_the_corner());
             apply(state, in_the_corner().back());
-            out.roots = out.bricks = 0;
+            to.roots = to.bricks = 0;
             for (uint32_t m = 0; m < steps.size(); ++m) {
                 for (uint64_t& word : other) ++word;
-                least(out.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
-                out.roots += roots_of(state.bricks.field(), state.bricks.field().jobs()) / kEdits;
-                out.bricks += double(state.bricks.field().jobs().size()) / kEdits;
+                least(to.forwards[m], seconds_of([&] { apply(state, steps[m]); }));
+                to.roots += roots_of(state.bricks.field(), state.bricks.field().jobs()) / kEdits;
+                to.bricks += double(state.bricks.field().jobs().size()) / kEdits;
             }
-            if (turn == 0) out.checksum = stored(state.bricks).checksum;
+            if (first) to.checksum = stored(state.bricks).checksum;
             for (uint32_t m = undo ? uint32_t(steps.size()) : 0; m-- > 0;)
-                least(out.backwards[m], seconds_of([&] { apply(state, steps[m].back()); }));
-            if (turn == 0 && undo) out.undone = stored(state.bricks).checksum;
-            if (!peer) continue;
+                least(to.backwards[m], seconds_of([&] { apply(state, steps[m].back()); }));
+            if (first && undo) to.undone = stored(state.bricks).checksum;
+        };
+        const auto theirs = [&](Turns& to) {
             const PeerGrid grid(peers()->copy(peer_grid()));
             for (uint32_t m = 0; m < steps.size(); ++m) {
                 const vec3 c = bite(m).node.transform.position;
                 const float center[3] = {c.x, c.y, c.z};
-                least(out.peer[m], seconds_of([&] { peers()->bite(grid.get(), center, kBiteRadius, threads); }));
+                least(to.peer[m], seconds_of([&] { peers()->bite(grid.get(), center, kBiteRadius, threads); }));
             }
+        };
+        for (int turn = 0; turn < run_.options.runs; ++turn) {
+            Turns before;
+            if (caches == Caches::Warm) ours(before, false);
+            ours(out, turn == 0);
+            if (!peer) continue;
+            theirs(before);
+            theirs(out);
         }
         return out;
     }
