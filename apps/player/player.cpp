@@ -99,7 +99,7 @@ private:
     void fly(float seconds);
     void walk();
     Result<void> start_or_stop_walking();
-    void look_at_file();
+    void look_at_files();
     bool walks() const { return hud_.walks; }
     void hold_mouse() {
         if (window_ && o_.keys.empty()) window_->hold_mouse(walks() || input_.button("right"));
@@ -368,10 +368,13 @@ Result<void> Player::start_or_stop_walking() {
 }
 
 // Other programs may write the scene, too.
-void Player::look_at_file() {
+void Player::look_at_files() {
     const std::string before = session_->warning();
-    if (session_->look_at_file()) {
-        const std::string news = session_->file() + " was changed by another program and is loaded again";
+    if (session_->look_at_files()) {
+        const std::string& changed = session_->changed();
+        const std::string news =
+            changed + " was changed by another program" +
+            (changed == session_->file() ? " and is loaded again" : "; " + session_->file() + " is loaded again");
         message(news);
         o_.say(news);
         if (!session_->note().empty()) o_.say(session_->note());
@@ -475,7 +478,7 @@ Result<void> Player::run() {
         if (auto taken = take_events(); !taken) return taken;
         looked_ += replays() ? kLookAtFile / kFramesALook : real;
         if (looked_ >= kLookAtFile) {
-            look_at_file();
+            look_at_files();
             looked_ = 0;
         }
         fly(float(seconds));

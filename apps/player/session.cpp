@@ -51,6 +51,7 @@ Result<std::unique_ptr<Session>> Session::open(const std::string& scene, const s
     if (!base) return base.error();
     out->base_ = std::make_unique<World>(std::move(*base));
     out->first_ = out->world_->history().now();
+    out->watch_parts();
     if (auto started = out->start(); !started) return started.error();
     return out;
 }
@@ -308,6 +309,7 @@ Result<void> Session::reload() {
         if (!parsed) return parsed.error();
         *world = std::make_unique<World>(std::move(*parsed));
     }
+    next->watch_parts();
     if (auto started = next->start(); !started) return started;
     const auto who = walker();
     world_.reset();  // lets go of the journal
@@ -325,13 +327,53 @@ Result<void> Session::reload() {
     return {};
 }
 
-bool Session::look_at_file() {
+void Session::watch_parts() {
+    parts_.clear();
+    if (!watch_ || text_of(file_).find("\"file\"") == std::string::npos)
+        return;  // as a world of 10⁶ edits, whose text takes seconds
+    std::error_code code;
+    for (const std::string& name : world_->files()) {
+        if (!std::filesystem::equivalent(name, file_, code))
+            parts_.push_back({name, WatchedFile(name), std::filesystem::exists(name, code), {}});
+    }
+}
+
+bool Session::look_at_parts() {
+    std::string warning;
+    for (Part& part : parts_) {
+        const std::string name = std::filesystem::path(part.name).filename().string();
+        const auto state = part.watch.look();
+        if (state == WatchedFile::State::Gone && part.there) {
+            warning = name + " is gone; the scene keeps what it had of it";
+        } else if (state == WatchedFile::State::Changed && dirty()) {
+            part.tried.reset();
+            warning = name +
+                      " was changed by another program, and your changes are not saved: the scene is loaded with it "
+                      "once they are saved, or all undone";
+        } else if (state == WatchedFile::State::Changed && part.tried == part.watch.found()) {
+            warning = warning_;
+        } else if (state == WatchedFile::State::Changed) {
+            part.tried = part.watch.found();
+            const std::string changed = part.name;
+            auto done = reload();
+            if (done) {
+                changed_ = changed;
+                return true;
+            }
+            warning = done.error().message;
+        }
+        if (!warning.empty()) break;
+    }
+    warning_ = warning;
+    return false;
+}
+
+bool Session::look_at_files() {
     if (!watch_) return false;
     const auto name = [&] { return std::filesystem::path(file_).filename().string(); };
     switch (watch_->look()) {
     case WatchedFile::State::Same:
-        warning_.clear();
-        break;
+        return look_at_parts();
     case WatchedFile::State::Gone:
         warning_ = name() + " is gone; Ctrl+S writes it again";
         break;
@@ -349,6 +391,7 @@ bool Session::look_at_file() {
             warning_ = done.error().message;
             break;
         }
+        changed_ = file_;
         return true;
     }
     return false;

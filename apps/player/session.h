@@ -62,9 +62,12 @@ public:
     Result<std::string> save();
     /// The world has changes that the scene file had not when it was last read or written here.
     bool dirty() const;
-    /// Whether another program has written the scene file. Without changes of our own it is loaded again and the play begins anew (true).
-    /// With some, and where it cannot be loaded, all stays as it is and warning() says so, as long as that holds.
-    bool look_at_file();
+    /// Whether another program has written the scene file, or one that the scene names. Without changes of our own the scene is loaded
+    /// again and the play begins anew (true). With some, and where it cannot be loaded, all stays as it is and warning() says so, as long
+    /// as that holds.
+    bool look_at_files();
+    /// The file for which look_at_files() last loaded the scene again.
+    const std::string& changed() const { return changed_; }
     const std::string& warning() const { return warning_; }
     /// What to tell somebody who leaves; empty when nothing is lost or pending. Changes that the next start would not find, since another
     /// program has written the scene file, are put beside it as a scene.
@@ -98,6 +101,8 @@ private:
     Result<void> start();
     /// All of it from the scene file anew, with nothing undone to go back to. Fails before anything has changed.
     Result<void> reload();
+    void watch_parts();
+    bool look_at_parts();
     /// What the world is now is what its scene file has.
     void is_saved() { saved_ = world_->history().now(); }
     /// Takes the digs of a stroke out of the play as it is; false where it cut something loose, or the play will not.
@@ -111,10 +116,18 @@ private:
     Told now(Told::What what) { return {.what = what, .at = steps_, .order = ++order_}; }
     void add(Action action);
 
-    std::string scene_, file_, backend_, note_, warning_;
+    std::string scene_, file_, backend_, note_, warning_, changed_;
     bool journaled_ = false, own_file_ = false;
     std::optional<WatchedFile> watch_;  // of file_, once it is read or written here
-    std::optional<uint64_t> tried_;     // hash of what could not be loaded
+    // Files that the scene names.
+    struct Part {
+        std::string name;
+        WatchedFile watch;
+        bool there;                     // when the scene was read
+        std::optional<uint64_t> tried;  // hash of what could not be loaded
+    };
+    std::vector<Part> parts_;
+    std::optional<uint64_t> tried_;  // hash of what could not be loaded
     std::unique_ptr<World> world_, base_;
     std::optional<Play> play_;
     std::optional<Action> stroke_;

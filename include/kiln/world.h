@@ -225,7 +225,9 @@ public:
     std::string history_json() const;
     /// What was found in the model files that the edits read, one sentence each: "bunny.obj: closed manifold of 69666 triangles".
     std::vector<std::string> model_notes() const;
-    /// Whether the scene is read from this file: its own, or one that it names (models, pictures, formulas). Write results elsewhere.
+    /// The files that the scene is read from: those that it names (models, pictures, formulas), and its own. None of a bundled scene.
+    std::vector<std::string> files() const;
+    /// Whether this is one of files(), whatever its name. Write results elsewhere.
     bool is_read_from(const std::string& file) const;
     /// Meshes that the scene names and that cannot be read, an error each: they are left out, the rest is drawn.
     std::vector<std::string> faults() const;

@@ -464,12 +464,19 @@ Result<void> World::flush() const {
     return impl_->journal->file.flush();
 }
 
+std::vector<std::string> World::files() const {
+    if (scene::is_bundled(impl_->data)) return {};
+    std::vector<std::string> out = scene::files_named(to_json(), impl_->data.folder);
+    if (!impl_->data.source.empty()) out.emplace_back(impl_->data.source.name());
+    std::ranges::sort(out);
+    out.erase(std::unique(out.begin(), out.end()), out.end());
+    return out;
+}
+
 bool World::is_read_from(const std::string& file) const {
     struct stat info {};
-    if (scene::is_bundled(impl_->data) || ::stat(file.c_str(), &info) != 0) return false;
-    std::vector<std::string> files = scene::files_named(to_json(), impl_->data.folder);
-    if (!impl_->data.source.empty()) files.emplace_back(impl_->data.source.name());
-    return std::ranges::any_of(files, [&](const std::string& read) { return scene::same_file(read, file); });
+    if (::stat(file.c_str(), &info) != 0) return false;
+    return std::ranges::any_of(files(), [&](const std::string& read) { return scene::same_file(read, file); });
 }
 
 std::optional<JournalReport> World::journal_report() const { return impl_->report; }

@@ -353,12 +353,12 @@ TEST_F(SessionOnAPillar, AFileThatAnotherProgramWroteIsLoadedAgainAndThePlayBegi
     ok(session_->advance(0, 1e9));
     EXPECT_FALSE(session_->dirty());
     write_bytes(file_, kPillar);
-    EXPECT_FALSE(session_->look_at_file()) << "the same text, written again";
+    EXPECT_FALSE(session_->look_at_files()) << "the same text, written again";
     EXPECT_EQ(session_->undo_depth(), 0);
     EXPECT_EQ(session_->steps(), 5);
     write_bytes(file_, kWall);
-    ASSERT_TRUE(session_->look_at_file()) << session_->warning();
-    EXPECT_FALSE(session_->look_at_file()) << "once";
+    ASSERT_TRUE(session_->look_at_files()) << session_->warning();
+    EXPECT_FALSE(session_->look_at_files()) << "once";
     EXPECT_TRUE(session_->world().find_edit("wall"));
     EXPECT_FALSE(session_->world().find_edit("pillar"));
     EXPECT_EQ(session_->steps(), 0);
@@ -377,7 +377,7 @@ TEST_F(SessionOnAPillar, AFileThatAnotherProgramWroteIsLoadedAgainAndThePlayBegi
     EXPECT_EQ(session_->world_hash(), dug) << "the journal has it";
     EXPECT_TRUE(session_->dirty()) << "and the file has not";
     ASSERT_TRUE(session_->save());
-    EXPECT_FALSE(session_->look_at_file()) << "what is written here is no other program's";
+    EXPECT_FALSE(session_->look_at_files()) << "what is written here is no other program's";
     open();
     EXPECT_EQ(session_->world_hash(), dug);
     EXPECT_FALSE(session_->dirty());
@@ -391,7 +391,7 @@ TEST_F(SessionOnAPillar, AHalfWrittenFileIsOneErrorAndChangesNothing) {
     for (const size_t length : {size_t{0}, wall.size() / 2, wall.size() - 1}) {
         write_bytes(file_, wall.substr(0, length));
         for (int i = 0; i < 2; ++i) {
-            EXPECT_FALSE(session_->look_at_file());
+            EXPECT_FALSE(session_->look_at_files());
             EXPECT_TRUE(session_->warning().starts_with(file_ + ":")) << session_->warning();
             EXPECT_EQ(session_->warning().find('\n'), std::string::npos);
         }
@@ -402,11 +402,11 @@ TEST_F(SessionOnAPillar, AHalfWrittenFileIsOneErrorAndChangesNothing) {
     // What cannot be played is no better than what cannot be read.
     write_bytes(file_, R"({"format": 1, "edits": [{"id": "ground", "shape": "plane"}],
         "bodies": [{"id": "b", "edits": ["ground"]}]})");
-    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_FALSE(session_->look_at_files());
     EXPECT_NE(session_->warning().find("a body without end"), std::string::npos) << session_->warning();
     EXPECT_EQ(session_->world_hash(), before);
     write_bytes(file_, wall);
-    EXPECT_TRUE(session_->look_at_file());
+    EXPECT_TRUE(session_->look_at_files());
     EXPECT_EQ(session_->warning(), "");
     EXPECT_TRUE(session_->world().find_edit("wall"));
 }
@@ -416,7 +416,7 @@ TEST_F(SessionOnAPillar, WhereBothHaveChangedNeitherIsLost) {
     stroke();
     const uint64_t dug = session_->world_hash();
     write_bytes(file_, kWall);
-    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_FALSE(session_->look_at_files());
     EXPECT_NE(session_->warning().find("changed by another program"), std::string::npos) << session_->warning();
     EXPECT_EQ(session_->world_hash(), dug);
     EXPECT_EQ(bytes_of(file_), kWall);
@@ -438,9 +438,9 @@ TEST_F(SessionOnAPillar, WhereBothHaveChangedNeitherIsLost) {
     // Whoever takes all of theirs back gets the other's.
     stroke({-0.05f, 1, 0});
     write_bytes(file_, kWall);
-    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_FALSE(session_->look_at_files());
     ASSERT_TRUE(*session_->undo());
-    EXPECT_TRUE(session_->look_at_file());
+    EXPECT_TRUE(session_->look_at_files());
     EXPECT_TRUE(session_->world().find_edit("wall"));
 }
 
@@ -453,7 +453,7 @@ TEST_F(SessionOnAPillar, ChangesThatTheNextStartWouldNotFindAreLeftBesideTheScen
             std::filesystem::remove(file_);
         else
             write_bytes(file_, kWall);
-        EXPECT_FALSE(session_->look_at_file());
+        EXPECT_FALSE(session_->look_at_files());
         EXPECT_NE(session_->warning().find(gone ? "is gone" : "changed by another"), std::string::npos);
         const std::string farewell = session_->farewell();
         EXPECT_NE(farewell.find(mine), std::string::npos) << farewell;
@@ -474,9 +474,61 @@ TEST_F(SessionOnAPillar, WhatAnEarlierStartLeftInTheJournalIsNotLostToAnotherPro
     const uint64_t dug = session_->world_hash();
     open();
     write_bytes(file_, kWall);
-    EXPECT_FALSE(session_->look_at_file());
+    EXPECT_FALSE(session_->look_at_files());
     EXPECT_EQ(session_->world_hash(), dug);
     EXPECT_NE(session_->farewell().find("pillar.unsaved.kiln.json"), std::string::npos);
+}
+
+// A cube of 1 m, or one that is twice as high.
+std::string cube(int height) {
+    std::string out;
+    for (int i = 0; i < 8; ++i)
+        out += "v " + std::to_string(i & 1) + " " + std::to_string((i >> 1 & 1) * height) + " " +
+               std::to_string(i >> 2) + "\n";
+    return out + "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+}
+
+TEST_F(SessionOnAPillar, AModelThatAnotherProgramWroteIsSeenWithItsScene) {
+    const std::string model = (folder_ / "cube.obj").string();
+    const auto high = [&] { return session_->play().cast({.origin = {0.5f, 1.5f, 5}, .direction = {0, 0, -1}})->hit; };
+    write_bytes(model, cube(1));
+    write_bytes(file_, R"({"format": 1, "field": {"voxel_size": 0.1}, "edits": [{"id": "ground", "shape": "plane"},
+        {"id": "cube", "shape": "mesh", "file": "cube.obj", "resolution": 16}]})");
+    open();
+    run(2);
+    EXPECT_FALSE(high());
+    EXPECT_FALSE(session_->look_at_files());
+    write_bytes(model, cube(2));
+    ASSERT_TRUE(session_->look_at_files()) << session_->warning();
+    EXPECT_EQ(session_->changed(), model);
+    EXPECT_FALSE(session_->look_at_files()) << "once";
+    EXPECT_EQ(session_->warning(), "");
+    run(1);
+    EXPECT_TRUE(high());
+    // What is not whole is not shown, and said as long as it is so.
+    write_bytes(model, "v 0 0\n");
+    for (int i = 0; i < 2; ++i) {
+        EXPECT_FALSE(session_->look_at_files());
+        EXPECT_NE(session_->warning().find("cube.obj"), std::string::npos) << session_->warning();
+    }
+    EXPECT_TRUE(high());
+    std::filesystem::remove(model);
+    EXPECT_FALSE(session_->look_at_files());
+    EXPECT_NE(session_->warning().find("cube.obj is gone"), std::string::npos) << session_->warning();
+    write_bytes(model, cube(2));
+    EXPECT_FALSE(session_->look_at_files());
+    EXPECT_EQ(session_->warning(), "");
+    // With changes of our own it waits for them.
+    stroke({3, 0, 0});
+    write_bytes(model, cube(1));
+    EXPECT_FALSE(session_->look_at_files());
+    EXPECT_NE(session_->warning().find("your changes are not saved"), std::string::npos) << session_->warning();
+    EXPECT_TRUE(high());
+    ASSERT_TRUE(session_->save());
+    ASSERT_TRUE(session_->look_at_files()) << session_->warning();
+    run(1);
+    EXPECT_FALSE(high());
+    EXPECT_EQ(session_->world().edits().size(), 4u) << "ours and theirs";
 }
 
 TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
@@ -496,7 +548,7 @@ TEST_F(SessionOnAPillar, ABundledSceneIsSavedBesideNothing) {
     EXPECT_NE(refused.error().message.find("is there already"), std::string::npos);
     // From then on the file is its own.
     write_bytes("tumble.kiln.json", kWall);
-    EXPECT_TRUE((*made)->look_at_file());
+    EXPECT_TRUE((*made)->look_at_files());
     EXPECT_TRUE((*made)->world().find_edit("wall"));
     std::filesystem::current_path(here);
 }

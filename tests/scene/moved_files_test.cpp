@@ -83,6 +83,8 @@ TEST(MovedFiles, AWorldKnowsWhatItIsReadFrom) {
     const auto world = World::load(scene);
     ASSERT_TRUE(world) << world.error().message;
     EXPECT_TRUE(world->is_read_from(scene));
+    EXPECT_THAT(world->files(), testing::ElementsAre((folder / "f.vm").string(), scene));
+    EXPECT_TRUE(World::load("orbit")->files().empty());
     EXPECT_TRUE(world->is_read_from((folder / "../").string() + folder.path().filename().string() + "/s.kiln.json"));
     EXPECT_TRUE(world->is_read_from((folder / "f.vm").string()));
     EXPECT_TRUE(world->is_read_from((folder / "link.vm").string()));
