@@ -8,7 +8,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
+#include <utility>
 
 namespace kiln::model {
 namespace {
@@ -117,28 +119,71 @@ Result<tinygltf::Model> load_gltf(std::string_view bytes, const std::string& nam
     }
 }
 
-Result<AccessorBytes> accessor_bytes(const tinygltf::Model& model, const tinygltf::Accessor& a, size_t element,
-                                     const std::string& name) {
-    AccessorBytes out;
-    out.count = a.count;
-    if (a.sparse.isSparse)
-        return Error{name + ": has sparse accessors, which are not read; export it without them", ErrorKind::Input};
-    if (a.bufferView < 0 || size_t(a.bufferView) >= model.bufferViews.size())
+// `count` elements of a view, from `offset` on.
+static Result<AccessorBytes> view_bytes(const tinygltf::Model& model, int number, size_t offset, size_t count,
+                                        size_t element, const std::string& name) {
+    if (number < 0 || size_t(number) >= model.bufferViews.size())
         return gltf_fault(name, "a buffer view that does not exist");
-    const tinygltf::BufferView& view = model.bufferViews[size_t(a.bufferView)];
+    const tinygltf::BufferView& view = model.bufferViews[size_t(number)];
     if (view.buffer < 0 || size_t(view.buffer) >= model.buffers.size())
         return gltf_fault(name, "a buffer that does not exist");
     const std::vector<unsigned char>& data = model.buffers[size_t(view.buffer)].data;
-    out.stride = view.byteStride != 0 ? view.byteStride : element;
+    AccessorBytes out{
+        .at = nullptr, .stride = view.byteStride != 0 ? view.byteStride : element, .count = count, .made = {}};
     const size_t limit = data.size();
-    if (view.byteOffset > limit || a.byteOffset > limit || a.count > limit || out.stride > limit)
+    if (view.byteOffset > limit || offset > limit || count > limit || out.stride > limit)
         return gltf_fault(name, "bytes outside its buffer");
-    const size_t from = view.byteOffset + a.byteOffset;
-    if (a.count > 0 && (from > limit || (a.count - 1) > (limit - from) / out.stride ||
-                        (a.count - 1) * out.stride + element > limit - from))
+    const size_t from = view.byteOffset + offset;
+    if (count > 0 && (from > limit || (count - 1) > (limit - from) / out.stride ||
+                      (count - 1) * out.stride + element > limit - from))
         return gltf_fault(name, "bytes outside its buffer");
     out.at = data.data() + from;
     return out;
+}
+
+// glTF 2.0, 3.6.2.3: what the view has, or zeros, but for the elements that are listed.
+static Result<AccessorBytes> sparse_bytes(const tinygltf::Model& model, const tinygltf::Accessor& a, size_t element,
+                                          const std::string& name) {
+    constexpr size_t kMostBytes = size_t(1) << 28;
+    const auto& sparse = a.sparse;
+    if (a.count > kMostBytes / element)
+        return Error{name + ": a sparse accessor of more than 256 MiB; split the model", ErrorKind::Input};
+    if (sparse.count < 0 || sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0)
+        return gltf_fault(name, "a place before its buffer");
+    size_t size = 0;
+    if (sparse.indices.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE) size = 1;
+    if (sparse.indices.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT) size = 2;
+    if (sparse.indices.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT) size = 4;
+    if (size == 0) return gltf_fault(name, "elements by numbers of a wrong type");
+    const auto listed = size_t(sparse.count);
+    const auto numbers =
+        view_bytes(model, sparse.indices.bufferView, size_t(sparse.indices.byteOffset), listed, size, name);
+    if (!numbers) return numbers.error();
+    const auto values =
+        view_bytes(model, sparse.values.bufferView, size_t(sparse.values.byteOffset), listed, element, name);
+    if (!values) return values.error();
+    std::vector<unsigned char> all(a.count * element);
+    if (a.bufferView >= 0) {
+        const auto dense = view_bytes(model, a.bufferView, a.byteOffset, a.count, element, name);
+        if (!dense) return dense.error();
+        for (size_t i = 0; i < a.count; ++i)
+            std::memcpy(all.data() + i * element, dense->at + i * dense->stride, element);
+    }
+    for (size_t i = 0; i < listed; ++i) {
+        size_t number = 0;
+        for (size_t b = size; b-- > 0;) number = number << 8 | numbers->at[i * numbers->stride + b];
+        if (number >= a.count)
+            return gltf_fault(name, formatted("element {} of a sparse accessor of {}", number, a.count));
+        std::memcpy(all.data() + number * element, values->at + i * values->stride, element);
+    }
+    auto made = std::make_shared<const std::vector<unsigned char>>(std::move(all));
+    return AccessorBytes{.at = made->data(), .stride = element, .count = a.count, .made = made};
+}
+
+Result<AccessorBytes> accessor_bytes(const tinygltf::Model& model, const tinygltf::Accessor& a, size_t element,
+                                     const std::string& name) {
+    if (a.sparse.isSparse) return sparse_bytes(model, a, element, name);
+    return view_bytes(model, a.bufferView, a.byteOffset, a.count, element, name);
 }
 
 Matrix node_matrix(const tinygltf::Node& node) {

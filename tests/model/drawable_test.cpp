@@ -242,6 +242,52 @@ TEST(Drawable, EveryBrokenReferenceIsOneErrorThatNamesTheElement) {
                 HasSubstr("materials[0].baseColorTexture names texture 5 of 0"));
 }
 
+// Most of the elements as a view has them, or zeros, and a list of others.
+TEST(Drawable, SparseAccessorsAreReadAndWhatIsWrongWithThemIsOneError) {
+    struct Sparse : SquareGlb {
+        std::vector<uint16_t> numbers{2};
+        std::vector<float> values{2, 3, 4};
+        std::string type = "5123", count = "4", base = "\"bufferView\":0,", listed = "1";
+        int moved = 0;  // of the views
+        std::string made() {
+            const int first = add_bytes(std::as_bytes(std::span(numbers))),
+                      second = add_bytes(std::as_bytes(std::span(values)));
+            accessors += ",{" + base + "\"componentType\":5126,\"count\":" + count +
+                         ",\"type\":\"VEC3\",\"sparse\":{\"count\":" + listed +
+                         ",\"indices\":{\"bufferView\":" + std::to_string(first + moved) +
+                         ",\"componentType\":" + type +
+                         "},\"values\":{\"bufferView\":" + std::to_string(second + moved) + "}}}";
+            attributes = "\"POSITION\":2";
+            return whole();
+        }
+    };
+    // Without normals each triangle has corners of its own: 0 1 2, 0 2 3.
+    const auto corners = [](const Drawable& d) {
+        std::vector<vec3> out;
+        for (const auto& v : d.vertices) out.push_back(v.position);
+        return out;
+    };
+    EXPECT_THAT(corners(good(Sparse().made())), testing::ElementsAre(vec3{0, 0, 0}, vec3{1, 0, 0}, vec3{2, 3, 4},
+                                                                     vec3{0, 0, 0}, vec3{2, 3, 4}, vec3{0, 1, 0}));
+    Sparse zeros;
+    zeros.base.clear();
+    zeros.numbers = {1, 2, 3}, zeros.values = {5, 0, 0, 5, 6, 0, 0, 6, 0}, zeros.listed = "3";
+    EXPECT_THAT(corners(good(zeros.made())), testing::ElementsAre(vec3{0, 0, 0}, vec3{5, 0, 0}, vec3{5, 6, 0},
+                                                                  vec3{0, 0, 0}, vec3{5, 6, 0}, vec3{0, 6, 0}));
+    const auto with = [](auto change) {
+        Sparse g;
+        change(g);
+        return fault(g.made());
+    };
+    EXPECT_THAT(with([](Sparse& g) { g.numbers = {4}; }),
+                HasSubstr("POSITION: refers to element 4 of a sparse accessor of 4"));
+    EXPECT_THAT(with([](Sparse& g) { g.type = "5126"; }), HasSubstr("elements by numbers of a wrong type"));
+    EXPECT_THAT(with([](Sparse& g) { g.moved = 1; }), HasSubstr("a buffer view that does not exist"));
+    EXPECT_THAT(with([](Sparse& g) { g.listed = "999"; }), HasSubstr("bytes outside its buffer"));
+    EXPECT_THAT(with([](Sparse& g) { g.base.clear(), g.count = "4000000000"; }), HasSubstr("more than 256 MiB"));
+    EXPECT_THAT(with([](Sparse& g) { g.count = "9"; }), HasSubstr("bytes outside its buffer"));
+}
+
 // Sizes that no file holds, bytes that are not there, numbers that are none.
 TEST(Drawable, AbsurdSizesAndMissingBuffersAreOneErrorThatNamesTheElement) {
     const auto with = [](auto change) {
