@@ -5,6 +5,8 @@
 
 #include "sdf/eval_isa.h"
 
+#include <cpuid.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <string_view>
@@ -28,6 +30,12 @@ namespace {
 
 const uint32_t* words(std::span<const Instruction> code) { return reinterpret_cast<const uint32_t*>(code.data()); }
 
+// Halves to floats and back; clang 14 does not know this one's name.
+bool has_f16c() {
+    unsigned a, b, c, d;
+    return __get_cpuid(1, &a, &b, &c, &d) != 0 && (c & bit_F16C) != 0;
+}
+
 bool processor_has(Isa isa) {
     switch (isa) {
     case Isa::Scalar:
@@ -35,8 +43,7 @@ bool processor_has(Isa isa) {
     case Isa::Sse4:
         return __builtin_cpu_supports("sse4.1") != 0;
     case Isa::Avx2:
-        return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0 &&
-               __builtin_cpu_supports("f16c") != 0;
+        return __builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0 && has_f16c();
     case Isa::Avx512:
         return __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512bw") != 0 &&
                __builtin_cpu_supports("avx512dq") != 0 && __builtin_cpu_supports("avx512vl") != 0;
