@@ -76,7 +76,7 @@ public:
              bool accelerate = true) const;
     /// The march alone, in voxels.
     MarchHit march(const TexelRay& ray, float t_min, float t_max, bool accelerate = true) const;
-    /// March of many rays at once, 16 (8, 4) neighbours of the list in step: give them in an order in which neighbours see the same.
+    /// March of many rays at once: give them in an order in which neighbours see the same, so that what they read is still near.
     /// Each hit has the bits of march() from 0 to the ray's t_max, but for the counters, which stay 0.
     void march(std::span<const Ray> rays, MarchHit* hits, sdf::Isa isa = sdf::best_isa()) const;
     /// The same, then each moved to where its brick's own code has the surface, and what a ray only just passed looked at with that code too:

@@ -223,7 +223,7 @@ struct RayList {
     static constexpr int kFields = int(sizeof(Record) / sizeof(I));
     int size = 0;
     alignas(64) int32_t of[kFields][kMostUnderWay + kLanes];
-    RayList() {}  // `of` stays as it is: clearing it for each block of rays would take longer than reading what it has
+    RayList() {}  // `of` stays as it is: what is read has been written
 
     [[gnu::always_inline]] Record from(int first) const {
         Record r;
