@@ -334,7 +334,7 @@ void Session::watch_parts() {
     std::error_code code;
     for (const std::string& name : world_->files()) {
         if (!std::filesystem::equivalent(name, file_, code))
-            parts_.push_back({name, WatchedFile(name), std::filesystem::exists(name, code), {}});
+            parts_.push_back({name, WatchedFile(name), std::filesystem::exists(name, code), {}, {}});
     }
 }
 
@@ -351,7 +351,7 @@ bool Session::look_at_parts() {
                       " was changed by another program, and your changes are not saved: the scene is loaded with it "
                       "once they are saved, or all undone";
         } else if (state == WatchedFile::State::Changed && part.tried == part.watch.found()) {
-            warning = warning_;
+            warning = part.fault;
         } else if (state == WatchedFile::State::Changed) {
             part.tried = part.watch.found();
             const std::string changed = part.name;
@@ -360,7 +360,7 @@ bool Session::look_at_parts() {
                 changed_ = changed;
                 return true;
             }
-            warning = done.error().message;
+            warning = part.fault = done.error().message;
         }
         if (!warning.empty()) break;
     }

@@ -125,6 +125,7 @@ private:
         WatchedFile watch;
         bool there;                     // when the scene was read
         std::optional<uint64_t> tried;  // hash of what could not be loaded
+        std::string fault;              // and why
     };
     std::vector<Part> parts_;
     std::optional<uint64_t> tried_;  // hash of what could not be loaded

@@ -511,6 +511,14 @@ TEST_F(SessionOnAPillar, AModelThatAnotherProgramWroteIsSeenWithItsScene) {
         EXPECT_FALSE(session_->look_at_files());
         EXPECT_NE(session_->warning().find("cube.obj"), std::string::npos) << session_->warning();
     }
+    // Nor is it forgotten for what is wrong with the scene meanwhile.
+    const std::string scene = bytes_of(file_);
+    write_bytes(file_, "{");
+    EXPECT_FALSE(session_->look_at_files());
+    EXPECT_EQ(session_->warning().find("cube.obj"), std::string::npos) << session_->warning();
+    write_bytes(file_, scene);
+    EXPECT_FALSE(session_->look_at_files());
+    EXPECT_NE(session_->warning().find("cube.obj"), std::string::npos) << session_->warning();
     EXPECT_TRUE(high());
     std::filesystem::remove(model);
     EXPECT_FALSE(session_->look_at_files());
