@@ -103,6 +103,20 @@ float BrickEvaluator::evaluate(std::span<const sdf::Instruction> code, ivec3 fir
     return cut_ ? octants_.evaluate(distances_.data()) : sdf::evaluate_brick(tape, x_, y_, z_, distances_.data());
 }
 
+void BrickEvaluator::begin(ivec3 first) {
+    place(first);
+    distances_.fill(sdf::kEmpty);
+}
+
+float BrickEvaluator::join(std::span<const sdf::Instruction> code) {
+    return sdf::evaluate_brick(sdf::view(*program_, code), x_, y_, z_, distances_.data());
+}
+
+void BrickEvaluator::end(std::span<const sdf::Instruction> code) {
+    code_ = code;
+    cut_ = false;
+}
+
 bool BrickEvaluator::keeps_away(std::span<const sdf::Instruction> edit, ivec3 first, sdf::Away from) {
     place(first);
     from.scale = voxels_per_metre_;

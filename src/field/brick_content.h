@@ -86,6 +86,12 @@ public:
 
     /// Distances of the texels of the brick that begins at global texel `first`; the smallest |distance|, metres.
     float evaluate(std::span<const sdf::Instruction> code, ivec3 first);
+    /// The same in parts, of a brick of which much may turn out to be enough: begin() makes it empty, join() runs code that goes on from what is
+    /// there and returns the smallest |distance|, highest() is the greatest distance so far, and end() says what all of its code is.
+    void begin(ivec3 first);
+    float join(std::span<const sdf::Instruction> code);
+    float highest() const { return sdf::highest(distances_); }
+    void end(std::span<const sdf::Instruction> code);
     /// Of the last evaluate(), metres, not clamped.
     const std::array<float, kBrickTexelCount>& distances() const { return distances_; }
     /// sdf::keeps_away() at the texels of the brick that begins at `first`. `from`: in voxels; its scale is set here.

@@ -125,13 +125,54 @@ bool CellMaker::beyond(float value, const sdf::Balls& balls) const {
     return v > balls.radius + lattice_.own_voxels * lattice_.voxel_size + 4e-6f * (lattice_.farthest + v);
 }
 
+// Of many edits that are only joined: those that reach deepest at the centre come first, until all texels are inside, or no more of them can
+// come to where some texel is not below them yet. What is left out changes no bit. False where the edits are few or do else than join.
+bool CellMaker::evaluate_by_depth(ivec3 first, float& least) {
+    const float own = lattice_.own_voxels * lattice_.voxel_size;
+    if (cells_.list.count < kManyEdits || culler_.kept_count(cells_, ball_) < kManyEdits ||
+        !culler_.unions_of(cells_, ball_, depths_))
+        return false;
+    const auto later = [](sdf::ListCuller::Depth a, sdf::ListCuller::Depth b) {
+        return a.value > b.value || (!(a.value < b.value) && a.entry > b.entry);
+    };
+    std::make_heap(depths_.begin(), depths_.end(), later);
+    evaluator_.begin(first);
+    for (float highest = sdf::kEmpty; !depths_.empty();) {
+        code_.clear();
+        for (int i = 0; i < kAtATime && !depths_.empty(); ++i) {
+            const sdf::ListCuller::Depth next = depths_.front();
+            const float reaches = next.value - cells_.balls.radius;
+            if (reaches - sdf::kPruneUlps * (lattice_.farthest + std::fabs(next.value)) > highest) {
+                depths_.clear();
+                break;
+            }
+            std::pop_heap(depths_.begin(), depths_.end(), later);
+            depths_.pop_back();
+            culler_.emit_union(cells_, ball_, next, code_);
+        }
+        if (code_.empty()) break;
+        least = evaluator_.join(code_);
+        highest = evaluator_.highest();
+        if (highest <= -own) break;
+    }
+    return true;
+}
+
 // The cell of the ball at hand; whether it owns a brick.
 bool CellMaker::evaluate(ivec3 cell) {
-    emit_code();
     ++cells_evaluated_;
     const ivec3 at = cell + lattice_.first;
-    const float least = evaluator_.evaluate(code_, {at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels});
-    return least < lattice_.own_voxels * lattice_.voxel_size;
+    const ivec3 first{at.x * kBrickVoxels, at.y * kBrickVoxels, at.z * kBrickVoxels};
+    const float own = lattice_.own_voxels * lattice_.voxel_size;
+    float least = sdf::kEmpty;
+    if (evaluate_by_depth(first, least)) {
+        if (!(least < own)) return false;
+        emit_code();
+        evaluator_.end(code_);
+        return true;
+    }
+    emit_code();
+    return evaluator_.evaluate(code_, first) < own;
 }
 
 }  // namespace kiln::field

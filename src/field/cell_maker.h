@@ -90,8 +90,11 @@ class CellMaker {
         sdf::ListCuller::Fold groups, cells;
         std::vector<uint32_t> rows;
         std::vector<sdf::Instruction> code;
+        std::vector<sdf::ListCuller::Depth> depths;
     };
     static std::vector<std::unique_ptr<Room>>& spare_rooms();
+    static constexpr size_t kManyEdits = 24;  // of fewer, all are evaluated sooner than they are put in order
+    static constexpr int kAtATime = 8;
     struct GiveBack {
         void operator()(Room* room) const;
     };
@@ -153,6 +156,7 @@ private:
     void place_ball(sdf::Balls& balls, int i, ivec3 cell, int size) const;
     void size_balls(sdf::Balls& balls, int size) const;
     bool beyond(float value, const sdf::Balls& balls) const;
+    bool evaluate_by_depth(ivec3 first, float& least);
     bool evaluate(ivec3 cell);
     template <bool kWholeList, typename Sink>
     void run_cells(Sink& sink);
@@ -167,6 +171,7 @@ private:
     sdf::ListCuller::Fold &groups_ = room_->groups, &cells_ = room_->cells;
     std::vector<uint32_t>& rows_ = room_->rows;
     std::vector<sdf::Instruction>& code_ = room_->code;
+    std::vector<sdf::ListCuller::Depth>& depths_ = room_->depths;
     BrickEvaluator evaluator_;
     ivec3 cell_[64];             // of the balls of cells_
     int ball_ = 0;               // of the brick at hand
@@ -264,7 +269,7 @@ void CellMaker::run_box(const CellBox& box, Sink& sink) {
 template <bool kWholeList, typename Sink>
 void CellMaker::run_cells(Sink& sink) {
     size_balls(cells_.balls, 1);
-    culler_.fold(cells_);
+    culler_.fold(cells_, cells_.list.count >= kManyEdits);
     uint64_t open = 0;
     for (int i = 0; i < 64; ++i) {
         if ((cells_.balls.live >> i & 1u) == 0) continue;

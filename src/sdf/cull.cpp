@@ -2,6 +2,7 @@
 #include "sdf/cull.h"
 
 #include "base/assert.h"
+#include "sdf/eval_isa.h"
 
 #include <algorithm>
 #include <bit>
@@ -42,13 +43,16 @@ ListCuller::List ListCuller::list_of(std::span<const uint32_t> rows) {
     for (const uint32_t row : rows) {
         const EditSpan& span = program_->edits[row];
         const uint32_t count = span.count - 1;
+        const std::span<const Instruction> code = program_->code.subspan(span.first, count);
+        const bool plain =
+            span.op == Op::Union && span.reach <= 0 && count == 2 && is_fused_leaf(code[0].word, code[1].word);
         entries_.push_back(
-            {row, span.first, count, FoldEntry::Combine, false, is_tree(program_->code.subspan(span.first, count))});
+            {row, span.first, count, span.material, plain, FoldEntry::Combine, false, !plain && is_tree(code)});
     }
     return out;
 }
 
-void ListCuller::fold(Fold& fold) {
+void ListCuller::fold(Fold& fold, bool own) {
     const size_t n = fold.list.count;
     const std::span<const Entry> entries = std::span(entries_).subspan(fold.list.first, n);
     const bool has_far = std::isfinite(fold.balls.far);
@@ -80,7 +84,9 @@ void ListCuller::fold(Fold& fold) {
     }
     fold.left.resize(n);
     fold.right.resize(n);
-    fold_list(fold_entries_, numbers_, fold.balls, fold.left.data(), fold.right.data(), fold.value);
+    if (own) fold.own.resize(64 * n);
+    fold_list(fold_entries_, numbers_, fold.balls, fold.left.data(), fold.right.data(), fold.value,
+              own ? fold.own.data() : nullptr);
 }
 
 // From the last edit to the first, as prune() walks its tape: a ball needs what comes before as a value, for its material, or not.
@@ -206,10 +212,34 @@ void ListCuller::emit(const Fold& fold, int ball, std::vector<Instruction>& out)
     });
 }
 
+size_t ListCuller::kept_count(const Fold& fold, int ball) {
+    size_t out = 0;
+    for (size_t first = 0; first < fold.list.count; first += 64)
+        out += size_t(std::popcount(fold.kept[first + size_t(ball)]));
+    return out;
+}
+
+bool ListCuller::unions_of(const Fold& fold, int ball, std::vector<Depth>& out) const {
+    out.clear();
+    bool unions = true;
+    each_kept(fold, ball, [&](size_t i, bool, bool shown) {
+        if (shown) return;  // it lost everywhere, but for its material
+        unions = unions && entries_[fold.list.first + i].plain;
+        out.push_back({fold.own[64 * i + size_t(ball)], uint32_t(i)});
+    });
+    return unions;
+}
+
+void ListCuller::emit_union(const Fold& fold, int ball, Depth one, std::vector<Instruction>& out) {
+    const Entry& entry = entries_[fold.list.first + one.entry];
+    write_content(entry, fold.balls.center(ball), fold.balls.radius, true, out);
+    write_join(entry, FoldEntry::Combine, out);
+}
+
 uint16_t ListCuller::only_material(const Fold& fold, int ball) const {
     uint16_t out = uint16_t(kNoMaterial);
     each_kept(fold, ball, [&](size_t i, bool, bool) {
-        const uint16_t material = program_->edits[entries_[fold.list.first + i].row].material;
+        const uint16_t material = entries_[fold.list.first + i].material;
         if (material == kNoMaterial || material == out) return;  // what has none shows another's
         out = out == kNoMaterial ? material : kSeveralMaterials;
     });

@@ -29,6 +29,7 @@ public:
         List list;
         Balls balls;
         alignas(64) float value[64];        ///< at the centres, metres
+        std::vector<float> own;             ///< by entry, where it was asked for: the edit's own values there, 64 each
         std::vector<uint64_t> left, right;  ///< by entry: who wins
         std::vector<uint64_t> kept;         ///< by ball, 64 entries a word: what it keeps
         std::vector<uint64_t> joined;       ///< by entry: kept with what was before it
@@ -38,13 +39,25 @@ public:
 
     /// The list of these rows, which are in order.
     List list_of(std::span<const uint32_t> rows);
-    /// Fills value, left and right; list and balls are the caller's.
-    void fold(Fold& fold);
+    /// Fills value, left and right, and `own` if asked to; list and balls are the caller's.
+    void fold(Fold& fold, bool own = false);
     /// Then, for the balls in `live`: what each keeps.
     void keep(Fold& fold, uint64_t live);
     /// Then, for one ball: its list, or its code (replacing `out`).
     List child(const Fold& fold, int ball);
     void emit(const Fold& fold, int ball, std::vector<Instruction>& out);
+    /// An edit of a ball's code, by its value at the centre.
+    struct Depth {
+        float value;
+        uint32_t entry;
+    };
+    /// After a fold with `own`: the edits of a ball's code, which is the least of them all; false where it is something else, or where octants
+    /// (octants.h) may be cut out of it.
+    bool unions_of(const Fold& fold, int ball, std::vector<Depth>& out) const;
+    /// Appends code that joins one of them to the others, of which there may be none yet but Empty.
+    void emit_union(const Fold& fold, int ball, Depth one, std::vector<Instruction>& out);
+    /// Of how many edits it is.
+    static size_t kept_count(const Fold& fold, int ball);
     /// The one material of everything in the ball; kSeveralMaterials where its edits have more than one.
     uint16_t only_material(const Fold& fold, int ball) const;
     /// How the ball's code begins. What was before that, and lost, is not in the code; yet it may have lost only because of an edit
@@ -68,6 +81,8 @@ private:
     struct Entry {
         uint32_t row;
         uint32_t code_first, code_count;
+        uint16_t material;  // the edit's
+        bool plain;  // a union that blends with nothing, of a shape whose leaves run over a whole brick in one loop
         FoldEntry::Join join;
         bool made;  // the code was made for this list; else it is the program's
         bool tree;  // has something to prune inside

@@ -127,9 +127,9 @@ double evaluate(const TapeView& tape, dvec3 p_world, MaterialMix* mix, bool edit
 }
 
 void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, const Balls& balls, uint64_t* left,
-               uint64_t* right, float* value, Isa isa) {
+               uint64_t* right, float* value, float* own, Isa isa) {
     KILN_CHOOSE(isa, fold_list)
-    (entries.data(), entries.size(), numbers.params, numbers.samples, balls, left, right, value,
+    (entries.data(), entries.size(), numbers.params, numbers.samples, balls, left, right, value, own,
      memory_of(numbers.memory_slots, kChunkBytes));
 }
 
@@ -137,6 +137,8 @@ float evaluate_brick(const TapeView& tape, const float* x, const float* y, const
     return KILN_CHOOSE(isa, evaluate_brick)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z, out,
                                             memory_of(tape.memory_slots, kChunkBytes));
 }
+
+float highest(std::span<const float> values, Isa isa) { return KILN_CHOOSE(isa, highest)(values.data()); }
 
 bool keeps_away(const TapeView& tape, const float* x, const float* y, const float* z, const Away& from, Isa isa) {
     return KILN_CHOOSE(isa, keeps_away)(words(tape.code), tape.code.size(), tape.params, tape.samples, x, y, z, from,

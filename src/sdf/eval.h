@@ -87,13 +87,18 @@ struct Balls {
 };
 
 /// Folds the list at the centres of 64 balls: value[i] is the world's there. Bit i of left[e] (right[e]) says that at edit e everything
-/// before it (the edit alone) decides throughout ball i: as sdf::prune finds, or because the other is beyond `far`.
+/// before it (the edit alone) decides throughout ball i: as sdf::prune finds, or because the other is beyond `far`. `own`: null, or takes
+/// each edit's own value at the centres, 64 an edit.
 void fold_list(std::span<const FoldEntry> entries, const TapeView& numbers, const Balls& balls, uint64_t* left,
-               uint64_t* right, float* value, Isa isa = best_isa());
+               uint64_t* right, float* value, float* own = nullptr, Isa isa = best_isa());
 
-/// evaluate() at the 512 points (x[i], y[j], z[k]), i fastest; the smallest |value| of them.
+/// evaluate() at the 512 points (x[i], y[j], z[k]), i fastest; the smallest |value| of them. Code that begins with joining an edit joins it
+/// to what `out` holds.
 float evaluate_brick(const TapeView& tape, const float* x, const float* y, const float* z, float* out,
                      Isa isa = best_isa());
+
+/// The greatest of 512 values.
+float highest(std::span<const float> values, Isa isa = best_isa());
 
 /// What an edit's values are compared with, texel by texel: see keeps_away().
 struct Away {

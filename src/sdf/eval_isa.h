@@ -19,9 +19,10 @@
                         const float* y, const float* z, int points, float* out, float* id0, float* id1, float* share,  \
                         int slot, void* memory);                                                                       \
     void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples,                  \
-                   const Balls& balls, uint64_t* left, uint64_t* right, float* value, void* memory);                   \
+                   const Balls& balls, uint64_t* left, uint64_t* right, float* value, float* own, void* memory);       \
     float evaluate_brick(const uint32_t* code, size_t count, const float* params, const float* samples,                \
                          const float* x, const float* y, const float* z, float* out, void* memory);                    \
+    float highest(const float* values);                                                                                \
     bool keeps_away(const uint32_t* code, size_t count, const float* params, const float* samples, const float* x,     \
                     const float* y, const float* z, const Away& from, void* memory);                                   \
     void store_halves(const float* values, size_t count, float scale, float limit, float least, uint16_t* codes,       \

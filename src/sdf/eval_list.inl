@@ -14,7 +14,7 @@ static inline uint64_t chunk_bits(const mask* m) {
 
 // See sdf/eval.h.
 void fold_list(const FoldEntry* entries, size_t count, const float* params, const float* samples, const Balls& balls, uint64_t* left,
-               uint64_t* right, float* value, void* memory) {
+               uint64_t* right, float* value, float* own, void* memory) {
     Registers r;
     r.memory = static_cast<Chunk*>(memory);
     load_chunk(r, balls.x, balls.y, balls.z, kChunkPoints);
@@ -31,6 +31,7 @@ void fold_list(const FoldEntry* entries, size_t count, const float* params, cons
         run_distance(r, e.code, e.code_count, params, Samples{samples});
         Chunk& running = r.value[0];
         const Chunk& other = r.value[1];
+        if (own != nullptr) store_chunk(other, own + kChunkPoints * at, kChunkPoints);
         if (e.join != FoldEntry::Combine) {
             const bool negated = e.join == FoldEntry::Negate || (e.join == FoldEntry::Take && e.op == 1);
             for (int i = 0; i < KILN_VECTORS; ++i) running.v[i] = negated ? -other.v[i] : other.v[i];
@@ -321,6 +322,20 @@ float evaluate_brick(const uint32_t* code, size_t count, const float* params, co
     float least = lanes[0];
     for (int i = 1; i < kBrickLanes; ++i) least = lanes[i] < least ? lanes[i] : least;
     return least;
+}
+
+// Of a brick's values.
+float highest(const float* values) {
+    real most[4];  // as in evaluate_brick()
+    for (int i = 0; i < 4; ++i) most[i] = load(values + i * kBrickLanes);
+    for (int at = 4 * kBrickLanes; at < kBrickSlices * kChunkPoints; at += 4 * kBrickLanes) {
+        for (int i = 0; i < 4; ++i) most[i] = max(most[i], load(values + at + i * kBrickLanes));
+    }
+    float lanes[kBrickLanes];
+    store(lanes, max(max(most[0], most[1]), max(most[2], most[3])));
+    float out = lanes[0];
+    for (int i = 1; i < kBrickLanes; ++i) out = lanes[i] > out ? lanes[i] : out;
+    return out;
 }
 
 #ifdef KILN_LANES

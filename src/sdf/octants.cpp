@@ -111,7 +111,7 @@ bool OctantCodes::cut(const TapeView& tape, const float* x, const float* y, cons
     }
     balls.live = ~uint64_t(0);
     float values[64];
-    fold_list(entries_, tape, balls, left_.data(), right_.data(), values, isa);
+    fold_list(entries_, tape, balls, left_.data(), right_.data(), values, nullptr, isa);
     return true;
 }
 

@@ -4,6 +4,7 @@
 
 #include "field/field.h"
 
+#include "field/host_bricks.h"
 #include "sdf/eval.h"
 #include "worlds.h"
 #include "rounds.h"
@@ -100,6 +101,33 @@ TEST(Field, CellsAreWhatTheWholeProgramSaysAndPrunedCodeHasItsBits) {
             ASSERT_FALSE(used[slot]);
             used[slot] = true;
         }
+    }
+}
+
+// Many edits that are only joined, of which a few cover most cells together: those are asked by depth, and most are not asked at all.
+TEST(Field, ACrowdIsWhatTheWholeProgramSaysThoughFewOfItAreAsked) {
+    for (const uint32_t seed : {1u, 2u, 3u}) {
+        worlds::Random r(seed);
+        worlds::World world{"crowd", {}, {.voxel_size = 0.03f, .bounds = {{-0.8f, -0.8f, -0.8f}, {0.8f, 0.8f, 0.8f}}}};
+        for (int i = 0; i < 1500; ++i) {
+            const float size = r.in(0.05f, 0.16f);
+            Edit e = worlds::edit(Sphere{.radius = size}, r.point(0.5f));
+            if (r.below(2) == 0) e.node.shape = Box{.half_extents = {size, 0.7f * size, 0.5f * size}};
+            if (seed == 2 && r.below(3) == 0) {
+                e.node.shape = Torus{.major_radius = size, .minor_radius = 0.4f * size};
+                e.node.transform.rotation = axis_angle(normalize(vec3{1, 2, 0.3f}), r.in(-3, 3));
+            }
+            if (seed == 2 && r.below(3) != 0) e = worlds::of_material(e, uint32_t(1 + r.below(3)));
+            // A few that do else than join: where they reach, all are asked in their order.
+            if (seed == 3 && i % 100 == 99) e.op = r.below(2) == 0 ? Op::Subtract : Op::Paint;
+            if (seed == 3 && i % 100 == 49) e.blend_radius = 0.1f;
+            world.edits.push_back(e);
+        }
+        const std::shared_ptr<const Field> field = world.field();
+        ASSERT_TRUE(field);
+        expect_true_field(*field, "crowd");
+        const HostBricks host = *HostBricks::build(worlds::compiled(world.edits), world.options);
+        EXPECT_EQ(host.hash(), HostBricks::bake(field).hash()) << "seed " << seed;
     }
 }
 
