@@ -39,8 +39,14 @@ function(kiln_module name)
             target_link_libraries(kiln_${name} PUBLIC kiln_${lower})
         endif()
     endforeach()
-    if(KILN_SANITIZE)
+    # Not those whose speed is measured: which functions of a file become part of others depends on what else is in it. Nor measure: its
+    # namespace is called as a function of kiln/mesh.h is.
+    if(KILN_SANITIZE OR NOT name MATCHES "^(sdf|field|physics|measure)$")
         kiln_together(kiln_${name} "${sources}")
+    endif()
+    # Most that needs a device is not run there: optimising takes longer than it saves.
+    if(KILN_SANITIZE MATCHES "address" AND name MATCHES "^(rhi|render)$")
+        target_compile_options(kiln_${name} PRIVATE -O0)
     endif()
     kiln_shaders(${name})
     set_property(GLOBAL APPEND PROPERTY KILN_MODULES ${name})

@@ -17,7 +17,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct BenchWords {
     std::vector<std::string> names;
     BenchOptions bench;
     std::vector<std::string> sizes;
@@ -120,13 +120,13 @@ int list(bool json) {
     return finish_data();
 }
 
-int bench(Options o) {
+int bench(BenchWords o) {
     if (o.list) return list(o.json);
     if (!o.sizes.empty()) o.bench.sizes.clear();
     for (const std::string& size : o.sizes) {
         int width = 0, height = 0, read = 0;
         if (std::sscanf(size.c_str(), "%5dx%5d%n", &width, &height, &read) != 2 || size_t(read) != size.size())
-            return fail({"--size " + size + ": not a size; write WIDTHxHEIGHT, such as 480x270", ErrorKind::Usage});
+            return fail(usage("--size " + size + ": not a size; write WIDTHxHEIGHT, such as 480x270"));
         o.bench.sizes.emplace_back(width, height);
     }
     Result<BenchReport> report = [&] {
@@ -141,7 +141,7 @@ int bench(Options o) {
 }  // namespace
 
 void add_bench(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<BenchWords>();
     CLI::App* verb = app.add_subcommand("bench",
                                         "Measures this machine at the engine's work, beside peers and roofs.\n\n"
                                         "Examples:\n"

@@ -13,12 +13,12 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct CompareOptions {
     std::string a, b;
     bool json = false;
 };
 
-int compare(const Options& o) {
+int compare(const CompareOptions& o) {
     const auto d = compare_images(o.a, o.b);
     if (!d) return fail(d.error());
     if (o.json) {
@@ -39,7 +39,7 @@ int compare(const Options& o) {
 }  // namespace
 
 void add_compare(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<CompareOptions>();
     CLI::App* verb = app.add_subcommand("compare",
                                         "Measures how far two pictures are apart: FLIP, PSNR, SSIM.\n\n"
                                         "Examples:\n"

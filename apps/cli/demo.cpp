@@ -16,12 +16,12 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct DemoOptions {
     PictureOptions picture;
     bool list = false, png = false;
 };
 
-int demo(Options o) {
+int demo(DemoOptions o) {
     const auto scenes = bundled_scenes();
     if (o.list) {
         size_t widest = 0;
@@ -62,7 +62,7 @@ int demo(Options o) {
 }  // namespace
 
 void add_demo(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<DemoOptions>();
     o->picture.scene = "quarry";
     CLI::App* verb = app.add_subcommand(
         "demo",

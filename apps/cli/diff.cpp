@@ -11,12 +11,12 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct DiffOptions {
     std::string a, b;
     bool json = false;
 };
 
-int diff(const Options& o) {
+int diff(const DiffOptions& o) {
     const auto a = load_scene(o.a);
     if (!a) return fail(a.error());
     const auto b = load_scene(o.b);
@@ -31,7 +31,7 @@ int diff(const Options& o) {
 }  // namespace
 
 void add_diff(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<DiffOptions>();
     CLI::App* verb = app.add_subcommand(
         "diff",
         "Tells how two scenes differ, by the ids of their edits.\n\n"

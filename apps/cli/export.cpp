@@ -15,12 +15,10 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct ExportOptions {
     std::string scene, output, format, cell, simplify;
     bool sharp = false, json = false, quiet = false;
 };
-
-Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
 
 // A number, and the unit behind it.
 struct Quantity {
@@ -47,7 +45,7 @@ std::optional<float> metres(std::string_view text, bool plain) {
     return float(q->value * unit);
 }
 
-Result<MeshSettings> settings_of(const Options& o) {
+Result<MeshSettings> settings_of(const ExportOptions& o) {
     MeshSettings s;
     s.sharp = o.sharp;
     if (!o.cell.empty()) {
@@ -71,7 +69,7 @@ Result<MeshSettings> settings_of(const Options& o) {
     return s;
 }
 
-Result<MeshFormat> format_of(const Options& o) {
+Result<MeshFormat> format_of(const ExportOptions& o) {
     if (!o.format.empty()) {
         if (const auto format = mesh_format("." + o.format)) return *format;
         return usage("--format " + o.format + ": there is no such format; use glb, obj, stl or ply");
@@ -81,7 +79,7 @@ Result<MeshFormat> format_of(const Options& o) {
     return usage("-o " + o.output + ": unknown kind of mesh; end the name in .glb, .obj, .stl or .ply");
 }
 
-int export_mesh(const Options& o) {
+int export_mesh(const ExportOptions& o) {
     const bool piped = o.output == "-";
     const auto settings = settings_of(o);
     if (!settings) return fail(settings.error());
@@ -159,7 +157,7 @@ int export_mesh(const Options& o) {
 }  // namespace
 
 void add_export(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ExportOptions>();
     CLI::App* verb =
         app.add_subcommand("export",
                            "Writes the surface as a closed mesh, cut at the field's bounds. Needs no device.\n\n"

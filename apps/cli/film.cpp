@@ -37,8 +37,7 @@ Result<Film> Film::open(const World& world, PictureOptions options, const std::s
     std::vector<std::string_view> views{"shaded"};
     for (const LinesView& view : kLinesViews) views.push_back(view.name);
     if (const std::string_view near = nearest_word(options.view, views); !near.empty() && near != options.view)
-        return Error{"--view " + options.view + ": there is no such view; did you mean " + std::string(near) + "?",
-                     ErrorKind::Usage};
+        return usage("--view " + options.view + ": there is no such view; did you mean " + std::string(near) + "?");
     auto settings = picture_settings(options);
     if (!settings) return settings.error();
     if (auto ok = writable(name_of(folder, 0)); !ok) return ok.error();

@@ -14,7 +14,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct ImportOptions {
     std::string model, output, unit = "m", up = "y";
     int resolution = 128;
     bool force = false;
@@ -26,17 +26,15 @@ struct Unit {
 };
 constexpr std::array<Unit, 4> kUnits{{{"mm", 0.001f}, {"cm", 0.01f}, {"m", 1}, {"in", 0.0254f}}};
 
-int usage(const std::string& message) { return fail(Error{message, ErrorKind::Usage}); }
-
-int run_import(const Options& o) {
+int run_import(const ImportOptions& o) {
     ImportSettings settings;
     settings.unit = 0;
     for (const Unit& unit : kUnits)
         if (unit.name == o.unit) settings.unit = unit.metres;
-    if (settings.unit == 0) return usage("--unit " + o.unit + ": not a unit; write mm, cm, m or in");
-    if (o.up != "y" && o.up != "z") return usage("--up " + o.up + ": not an axis; write y or z");
+    if (settings.unit == 0) return fail(usage("--unit " + o.unit + ": not a unit; write mm, cm, m or in"));
+    if (o.up != "y" && o.up != "z") return fail(usage("--up " + o.up + ": not an axis; write y or z"));
     if (o.resolution < 8 || o.resolution > 512)
-        return usage("--resolution " + std::to_string(o.resolution) + ": must be between 8 and 512");
+        return fail(usage("--resolution " + std::to_string(o.resolution) + ": must be between 8 and 512"));
     if (auto ok = writable_scene(o.output, o.force); !ok) return fail(ok.error());
     settings.z_up = o.up == "z";
     settings.resolution = o.resolution;
@@ -53,7 +51,7 @@ int run_import(const Options& o) {
 }  // namespace
 
 void add_import(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ImportOptions>();
     CLI::App* verb = app.add_subcommand("import",
                                         "Makes a scene of a model file. Needs no device.\n\n"
                                         "Examples:\n"

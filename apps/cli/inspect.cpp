@@ -14,7 +14,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct InspectOptions {
     std::string scene;
     bool json = false, history = false;
 };
@@ -51,7 +51,7 @@ std::string history_for_people(World& world) {
     return out;
 }
 
-int inspect(const Options& o) {
+int inspect(const InspectOptions& o) {
     auto world = o.history ? World::load(o.scene, 0, true) : load_scene(o.scene);
     if (!world) return fail(world.error());
     if (o.history) {
@@ -63,7 +63,7 @@ int inspect(const Options& o) {
     return finish_data();
 }
 
-int validate(const Options& o) {
+int validate(const InspectOptions& o) {
     auto world = load_scene(o.scene);
     if (world && !world->faults().empty()) {
         std::string all;
@@ -95,7 +95,7 @@ int validate(const Options& o) {
 }  // namespace
 
 void add_inspect(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<InspectOptions>();
     CLI::App* verb = app.add_subcommand("inspect",
                                         "Tells what is in a scene. Needs no device.\n\n"
                                         "Examples:\n"
@@ -109,7 +109,7 @@ void add_inspect(CLI::App& app, Run& run) {
 }
 
 void add_validate(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<InspectOptions>();
     CLI::App* verb =
         app.add_subcommand("validate",
                            "Checks a scene; the error tells file, line, column, key and mend. Needs no device.\n\n"

@@ -12,7 +12,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct NewOptions {
     std::string scene, from;
     bool force = false, json = false;
 };
@@ -32,7 +32,7 @@ constexpr std::string_view kFirst = R"({
 }
 )";
 
-int make(const Options& o) {
+int make(const NewOptions& o) {
     if (auto ok = writable_scene(o.scene, o.force); !ok) return fail(ok.error());
     auto world = o.from.empty() ? World::parse(kFirst, o.scene) : load_scene(o.from);
     if (!world) return fail(world.error());
@@ -47,7 +47,7 @@ int make(const Options& o) {
 }  // namespace
 
 void add_new(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<NewOptions>();
     CLI::App* verb = app.add_subcommand("new",
                                         "Makes a scene: a ball on the ground, or a copy of another.\n\n"
                                         "Examples:\n"

@@ -26,8 +26,6 @@ constexpr std::string_view kLightings[] = {"clusters", "volumes"};
 constexpr std::string_view kAos[] = {"off", "half", "full"};
 constexpr std::string_view kOutlines[] = {"seen", "hidden", "hulls"};
 
-Error usage(const std::string& message) { return {message, ErrorKind::Usage}; }
-
 // Where what was asked for stands among the words that an option knows; else `none` and what to write instead.
 Result<size_t> place_of(const std::string& option, const std::string& asked, std::span<const std::string_view> words,
                         const char* none) {
@@ -260,7 +258,7 @@ Result<std::vector<Camera>> stops_of(const World& world, const std::string& path
         for (size_t at = 0; at <= path.size();) {
             const size_t end = std::min(path.find(',', at), path.size());
             auto camera = world.camera(path.substr(at, end - at));
-            if (!camera) return Error{"--path " + path + ": " + camera.error().message, ErrorKind::Usage};
+            if (!camera) return usage("--path " + path + ": " + camera.error().message);
             out.push_back(*camera);
             at = end + 1;
         }

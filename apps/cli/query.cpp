@@ -20,7 +20,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct QueryOptions {
     std::string scene, points;
     bool bricks = false, rays = false, nearest = false;
 };
@@ -204,7 +204,7 @@ void answer_rays(const World& world, const std::vector<Row>& rows, FieldSource s
     }
 }
 
-int query(const Options& o) {
+int query(const QueryOptions& o) {
     if (o.nearest && (o.bricks || o.rays)) {
         say("kiln query: --nearest does not go together with --field or --rays; leave it out");
         return kUsage;
@@ -247,7 +247,7 @@ int query(const Options& o) {
 }  // namespace
 
 void add_query(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<QueryOptions>();
     CLI::App* verb = app.add_subcommand("query",
                                         "Answers distance, normal and material at points, as CSV. Needs no device.\n\n"
                                         "Examples:\n"

@@ -28,7 +28,7 @@ void add_journal(Json& json, const World& world) {
 }
 
 Result<void> writable_scene(const std::string& path, bool force) {
-    if (!path.ends_with(".kiln.json")) return Error{path + ": a scene's name ends in .kiln.json", ErrorKind::Usage};
+    if (!path.ends_with(".kiln.json")) return usage(path + ": a scene's name ends in .kiln.json");
     std::error_code ignored;
     for (const std::string& file : {path, path + ".journal"})
         if (!force && std::filesystem::exists(file, ignored))
@@ -39,7 +39,7 @@ Result<void> writable_scene(const std::string& path, bool force) {
 
 Result<void> not_read(const World& world, const std::string& output) {
     if (!world.is_read_from(output)) return {};
-    return Error{output + ": the scene is read from it; choose another name", ErrorKind::Usage};
+    return usage(output + ": the scene is read from it; choose another name");
 }
 
 }  // namespace kiln::cli

@@ -18,7 +18,7 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct SimulateOptions {
     std::string scene, edits, ground = "field";
     SimulateSettings settings;
     std::string out, keep;
@@ -27,7 +27,7 @@ struct Options {
     bool json = false, force = false;
 };
 
-int simulate(const Options& o) {
+int simulate(const SimulateOptions& o) {
     auto world = World::load(o.scene);
     if (!world) return fail(world.error());
     for (const std::string& section : world->not_drawn_yet())
@@ -46,13 +46,12 @@ int simulate(const Options& o) {
     settings.mesh_ground = o.ground == "mesh";
     std::optional<Film> film;
     if (o.png) {
-        if (o.out.empty())
-            return fail(Error{"--png wants a folder for its pictures; add --out FOLDER", ErrorKind::Usage});
+        if (o.out.empty()) return fail(usage("--png wants a folder for its pictures; add --out FOLDER"));
         auto opened = Film::open(*world, o.pictures, o.out);
         if (!opened) return fail(opened.error());
         film = std::move(*opened);
     } else if (!o.out.empty()) {
-        return fail(Error{"--out is for pictures; add --png", ErrorKind::Usage});
+        return fail(usage("--out is for pictures; add --png"));
     }
     Progress progress;
     std::optional<World> kept;
@@ -92,7 +91,7 @@ int simulate(const Options& o) {
 }  // namespace
 
 void add_simulate(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<SimulateOptions>();
     CLI::App* verb = app.add_subcommand(
         "simulate",
         "Runs a scene's bodies without a window.\n\n"

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace kiln::cli {
 
@@ -16,6 +17,8 @@ enum Exit { kDone = 0, kFailed = 1, kUsage = 2, kBadInput = 3, kNoDevice = 4, kO
 void say(std::string_view line);
 /// A measure for people: two decimals below 10, else none.
 std::string brief(double value, const char* unit);
+/// An error in what was asked for.
+inline Error usage(std::string message) { return {std::move(message), ErrorKind::Usage}; }
 /// Says the error in one line, with a hint where one helps; answers its exit code.
 int fail(const Error& error);
 /// Data on stdout; an answer of false means that nobody could take it (disk full, closed pipe).

@@ -15,12 +15,12 @@ namespace kiln::cli {
 
 namespace {
 
-struct Options {
+struct ViewOptions {
     PictureOptions picture;
     player::PlayerOptions player;
 };
 
-int view(Options o) {
+int view(ViewOptions o) {
     if (o.picture.quality == "auto") o.picture.quality.clear();
     auto settings = picture_settings(o.picture);  // what --size and --quality may say
     if (!settings) return fail(settings.error());
@@ -28,14 +28,14 @@ int view(Options o) {
     o.player.height = settings->height;
     o.player.choose_quality = o.picture.quality.empty();
     if (!o.player.choose_quality) o.player.quality = *quality_named(o.picture.quality);
-    if (o.player.frames < 0) return fail(Error{"--frames takes a number above 0", ErrorKind::Usage});
+    if (o.player.frames < 0) return fail(usage("--frames takes a number above 0"));
     for (const std::string& path : {o.player.screenshot, o.player.ui_json}) {
         if (path.empty()) continue;
-        if (path == "-") return fail(Error{"-: a file has to be named, stdout has no pictures", ErrorKind::Usage});
+        if (path == "-") return fail(usage("-: a file has to be named, stdout has no pictures"));
         if (auto ok = writable(path); !ok) return fail(ok.error());
     }
     if (!o.player.screenshot.empty() && !o.player.screenshot.ends_with(".png"))
-        return fail(Error{"--screenshot " + o.player.screenshot + ": end the name in .png", ErrorKind::Usage});
+        return fail(usage("--screenshot " + o.player.screenshot + ": end the name in .png"));
     o.player.scene = o.picture.scene;
     o.player.camera = o.picture.camera;
     o.player.device = o.picture.device;
@@ -58,7 +58,7 @@ int view(Options o) {
 }  // namespace
 
 void add_view(CLI::App& app, Run& run) {
-    auto o = std::make_shared<Options>();
+    auto o = std::make_shared<ViewOptions>();
     CLI::App* verb = app.add_subcommand(
         "view", "Opens a window on a scene that runs: fly, dig, throw.\n\n" + std::string(player::player_keys()) +
                     "\n\n"
